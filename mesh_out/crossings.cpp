@@ -1,0 +1,382 @@
+#include "mesh_out/crossings_detail.h"
+
+#include <array>
+#include <bit>
+#include <optional>
+#include <utility>
+#include <vector>
+
+#include <boost/multiprecision/cpp_int.hpp>
+#include <tbb/blocked_range.h>
+#include <tbb/parallel_for.h>
+#include <tbb/parallel_invoke.h>
+#include <tbb/parallel_reduce.h>
+
+namespace taihu {
+namespace {
+
+using boost::multiprecision::cpp_int;
+__extension__ typedef __int128 Int128;
+
+// Half a unit in the last place, and the errors of the two determinants over their permanents:
+// Shewchuk 1997, "Adaptive precision floating-point arithmetic", bounds A (from memory, unchecked;
+// the tests compare with rational arithmetic).
+constexpr double kHalfUlp = 0x1p-53;
+constexpr double kBound3d = (7 + 56 * kHalfUlp) * kHalfUlp;
+constexpr double kBound2d = (3 + 16 * kHalfUlp) * kHalfUlp;
+// The bounds hold without underflow. Below this size of a difference the absolute slack covers it.
+constexpr double kMaxDifference = 1e90;
+constexpr double kUnderflowSlack = 1e-200;
+
+template <class Number>
+int sign(const Number& x) {
+    return x > 0 ? 1 : x < 0 ? -1 : 0;
+}
+
+/// value == mantissa * 2^exponent, the mantissa odd (or zero).
+struct Binary {
+    std::int64_t mantissa = 0;
+    int exponent = 0;
+};
+
+Binary split(double value) {
+    if (value == 0)
+        return {};
+    int exponent = 0;
+    const auto whole = static_cast<std::int64_t>(std::ldexp(std::frexp(value, &exponent), 53));
+    const int zeros = std::countr_zero(static_cast<std::uint64_t>(whole));
+    return {whole / (std::int64_t{1} << zeros), exponent - 53 + zeros};
+}
+
+/// The values as integers in one common unit, a power of two; nothing when one would pass
+/// `max_bits`.
+template <class Int, std::size_t N>
+std::optional<std::array<Int, N>> integers(const std::array<double, N>& values, int max_bits) {
+    std::array<Binary, N> parts;
+    int unit = 2000; // above every exponent of a double
+    for (std::size_t i = 0; i < N; ++i) {
+        parts[i] = split(values[i]);
+        if (parts[i].mantissa != 0)
+            unit = std::min(unit, parts[i].exponent);
+    }
+    std::array<Int, N> out;
+    for (std::size_t i = 0; i < N; ++i) {
+        const auto [mantissa, exponent] = parts[i];
+        if (mantissa == 0) {
+            out[i] = 0;
+            continue;
+        }
+        const int shift = exponent - unit;
+        const auto size = static_cast<std::uint64_t>(mantissa < 0 ? -mantissa : mantissa);
+        if (static_cast<int>(std::bit_width(size)) + shift > max_bits)
+            return std::nullopt;
+        out[i] = mantissa;
+        out[i] <<= static_cast<unsigned>(shift);
+    }
+    return out;
+}
+
+constexpr int kAnyBits = 1 << 20;
+constexpr int kProductBits = 40; // three factors and the sum of six products fit 127 bits
+
+bool is_exact_difference(double a, double b) {
+    const double d = a - b, b_used = a - d, a_used = d + b_used;
+    return (a - a_used) + (b_used - b) == 0; // the tail of Knuth's two-sum
+}
+
+template <class Int>
+int sign_of_det3(const std::array<Int, 9>& m) {
+    const Int x = m[4] * m[8] - m[5] * m[7], y = m[5] * m[6] - m[3] * m[8],
+              z = m[3] * m[7] - m[4] * m[6];
+    return sign(Int(m[0] * x + m[1] * y + m[2] * z));
+}
+
+int exact_orient3d(const Vec3& a, const Vec3& b, const Vec3& c, const Vec3& d) {
+    std::array<double, 9> difference;
+    bool exact = true;
+    for (int i = 0; i < 3; ++i)
+        for (int k = 0; k < 3; ++k) {
+            const double p = (i == 0 ? b : i == 1 ? c : d)[k];
+            difference[static_cast<std::size_t>(3 * i + k)] = p - a[k];
+            exact = exact && is_exact_difference(p, a[k]);
+        }
+    // Nearly every doubtful case: points of one flat patch on a grid or in single precision.
+    if (exact)
+        if (const auto small = integers<Int128>(difference, kProductBits))
+            return sign_of_det3(*small);
+    const std::array<double, 12> all = {a.x, a.y, a.z, b.x, b.y, b.z, c.x, c.y, c.z, d.x, d.y, d.z};
+    const auto whole = *integers<cpp_int>(all, kAnyBits);
+    std::array<cpp_int, 9> m;
+    for (std::size_t i = 0; i < 9; ++i)
+        m[i] = whole[i + 3] - whole[i % 3];
+    return sign_of_det3(m);
+}
+
+struct Point2 {
+    double u = 0, v = 0;
+    friend bool operator==(const Point2&, const Point2&) = default;
+};
+
+/// Sign of det(b - a, c - a), exact: +1 when a, b, c turn counter-clockwise.
+int orient2d(const Point2& a, const Point2& b, const Point2& c) {
+    const double bu = b.u - a.u, bv = b.v - a.v, cu = c.u - a.u, cv = c.v - a.v;
+    const double left = bu * cv, right = bv * cu, det = left - right;
+    const double bound = kBound2d * (std::abs(left) + std::abs(right)) + kUnderflowSlack;
+    if (std::abs(det) > bound &&
+        std::max({std::abs(bu), std::abs(bv), std::abs(cu), std::abs(cv)}) < kMaxDifference)
+        return sign(det);
+    if (is_exact_difference(b.u, a.u) && is_exact_difference(b.v, a.v) &&
+        is_exact_difference(c.u, a.u) && is_exact_difference(c.v, a.v))
+        if (const auto m = integers<Int128>(std::array{bu, bv, cu, cv}, kProductBits))
+            return sign(Int128((*m)[0] * (*m)[3] - (*m)[1] * (*m)[2]));
+    const auto w = *integers<cpp_int>(std::array{a.u, a.v, b.u, b.v, c.u, c.v}, kAnyBits);
+    return sign(cpp_int((w[2] - w[0]) * (w[5] - w[1]) - (w[3] - w[1]) * (w[4] - w[0])));
+}
+
+/// `p` without its coordinate `axis`.
+Point2 dropped(const Vec3& p, int axis) {
+    return {p[(axis + 1) % 3], p[(axis + 2) % 3]};
+}
+
+/// An axis along which abc may be projected without losing its area, or 3 if there is none.
+int projection_axis(const Vec3& a, const Vec3& b, const Vec3& c) {
+    for (int axis = 0; axis < 3; ++axis)
+        if (orient2d(dropped(a, axis), dropped(b, axis), dropped(c, axis)) != 0)
+            return axis;
+    return 3;
+}
+
+bool in_box(const Point2& p, const Point2& a, const Point2& b) {
+    return p.u >= std::min(a.u, b.u) && p.u <= std::max(a.u, b.u) && p.v >= std::min(a.v, b.v) &&
+           p.v <= std::max(a.v, b.v);
+}
+
+bool segments_meet(const Point2& a, const Point2& b, const Point2& c, const Point2& d) {
+    const int abc = orient2d(a, b, c), abd = orient2d(a, b, d), cda = orient2d(c, d, a),
+              cdb = orient2d(c, d, b);
+    if (abc != abd && cda != cdb)
+        return true;
+    return (abc == 0 && in_box(c, a, b)) || (abd == 0 && in_box(d, a, b)) ||
+           (cda == 0 && in_box(a, c, d)) || (cdb == 0 && in_box(b, c, d));
+}
+
+using Corners = std::array<Vec3, 3>;
+
+bool all_of_one_sign(int x, int y, int z) {
+    return (x >= 0 && y >= 0 && z >= 0) || (x <= 0 && y <= 0 && z <= 0);
+}
+
+/// segment_meets() for a segment in the plane of the triangle.
+bool meets_in_plane(const Vec3& p, const Vec3& q, const Corners& t) {
+    const int axis = projection_axis(t[0], t[1], t[2]);
+    const Point2 s = dropped(p, axis), e = dropped(q, axis);
+    const std::array<Point2, 3> c = {dropped(t[0], axis), dropped(t[1], axis), dropped(t[2], axis)};
+    if (all_of_one_sign(orient2d(c[0], c[1], s), orient2d(c[1], c[2], s), orient2d(c[2], c[0], s)))
+        return true;
+    return segments_meet(s, e, c[0], c[1]) || segments_meet(s, e, c[1], c[2]) ||
+           segments_meet(s, e, c[2], c[0]);
+}
+
+/// Whether the closed segment pq meets the closed triangle t; `side_p` and `side_q` are the sides
+/// of its plane on which p and q lie.
+bool segment_meets(const Vec3& p, const Vec3& q, int side_p, int side_q, const Corners& t) {
+    if (side_p * side_q > 0)
+        return false;
+    if (side_p == 0 && side_q == 0)
+        return meets_in_plane(p, q, t);
+    return all_of_one_sign(orient3d(p, q, t[0], t[1]), orient3d(p, q, t[1], t[2]),
+                           orient3d(p, q, t[2], t[0]));
+}
+
+/// Whether abc and abd, with ab in common, lie in one plane on the same side of ab.
+bool folded(const Vec3& a, const Vec3& b, const Vec3& c, const Vec3& d) {
+    if (orient3d(a, b, c, d) != 0)
+        return false;
+    const int axis = projection_axis(a, b, c);
+    const Point2 a2 = dropped(a, axis), b2 = dropped(b, axis);
+    return orient2d(a2, b2, dropped(c, axis)) == orient2d(a2, b2, dropped(d, axis));
+}
+
+/// Permutes both triples so that what they share comes first, in the same order; how many that is.
+std::size_t move_shared_first(Triangle& f, Triangle& g) {
+    std::size_t n = 0;
+    for (std::size_t i = 0; i < 3; ++i)
+        for (std::size_t k = n; k < 3; ++k)
+            if (f[i] == g[k]) {
+                std::swap(g[k], g[n]);
+                std::swap(f[i], f[n]);
+                ++n;
+                break;
+            }
+    return n;
+}
+
+/// The faces in the order of a binary tree of boxes: node i has the children 2i + 1 and 2i + 2, and
+/// each halves its range of faces, so that neither ranges nor links are stored.
+class BoxTree {
+public:
+    struct Face {
+        Box box;
+        Triangle vertices{};
+    };
+
+    BoxTree(std::span<const Vec3> positions, std::span<const Triangle> faces)
+        : faces_(faces.size()) {
+        tbb::parallel_for(std::size_t{0}, faces.size(), [&](std::size_t i) {
+            faces_[i].vertices = faces[i];
+            for (const std::uint32_t v : faces[i])
+                faces_[i].box.include(positions[v]);
+        });
+        while (faces_.size() >> depth_ > kLeafFaces)
+            ++depth_;
+        boxes_.resize((std::size_t{2} << depth_) - 1);
+        build(0, 0, faces_.size(), depth_);
+    }
+
+    std::span<const Face> faces() const { return faces_; }
+
+    /// Calls visit(i) for the faces from `first` on that lie in leaves whose box meets `box`.
+    template <class Visit>
+    void visit_from(std::size_t first, const Box& box, const Visit& visit) const {
+        descend(0, 0, faces_.size(), depth_, first, box, visit);
+    }
+
+    static bool overlap(const Box& a, const Box& b) {
+        return a.lo.x <= b.hi.x && b.lo.x <= a.hi.x && a.lo.y <= b.hi.y && b.lo.y <= a.hi.y &&
+               a.lo.z <= b.hi.z && b.lo.z <= a.hi.z;
+    }
+
+private:
+    static constexpr std::size_t kLeafFaces = 4;
+
+    void build(std::size_t node, std::size_t begin, std::size_t end, unsigned depth) {
+        if (depth == 0) {
+            for (std::size_t i = begin; i < end; ++i)
+                boxes_[node] = joined(boxes_[node], faces_[i].box);
+            return;
+        }
+        Box middles;
+        for (std::size_t i = begin; i < end; ++i)
+            middles.include(middle(faces_[i]));
+        const Vec3 size = middles.size();
+        const int axis = size.x >= size.y && size.x >= size.z ? 0 : size.y >= size.z ? 1 : 2;
+        const std::size_t half = begin + (end - begin) / 2;
+        const auto at = [&](std::size_t i) {
+            return faces_.begin() + static_cast<std::ptrdiff_t>(i);
+        };
+        std::nth_element(at(begin), at(half), at(end), [axis](const Face& a, const Face& b) {
+            return middle(a)[axis] < middle(b)[axis];
+        });
+        const auto left = [&] { build(2 * node + 1, begin, half, depth - 1); };
+        const auto right = [&] { build(2 * node + 2, half, end, depth - 1); };
+        if (end - begin > 4096) {
+            tbb::parallel_invoke(left, right);
+        } else {
+            left();
+            right();
+        }
+        boxes_[node] = joined(boxes_[2 * node + 1], boxes_[2 * node + 2]);
+    }
+
+    template <class Visit>
+    void descend(std::size_t node, std::size_t begin, std::size_t end, unsigned depth,
+                 std::size_t first, const Box& box, const Visit& visit) const {
+        if (end <= first || !overlap(boxes_[node], box))
+            return;
+        if (depth == 0) {
+            for (std::size_t i = std::max(begin, first); i < end; ++i)
+                visit(i);
+            return;
+        }
+        const std::size_t half = begin + (end - begin) / 2;
+        descend(2 * node + 1, begin, half, depth - 1, first, box, visit);
+        descend(2 * node + 2, half, end, depth - 1, first, box, visit);
+    }
+
+    // Halved before they are added, or huge ones would overflow.
+    static Vec3 middle(const Face& f) { return f.box.lo * 0.5 + f.box.hi * 0.5; }
+    static Box joined(const Box& a, const Box& b) { return {min(a.lo, b.lo), max(a.hi, b.hi)}; }
+
+    std::vector<Face> faces_;
+    std::vector<Box> boxes_;
+    unsigned depth_ = 0;
+};
+
+} // namespace
+
+int orient3d(const Vec3& a, const Vec3& b, const Vec3& c, const Vec3& d) {
+    const Vec3 p = b - a, q = c - a, r = d - a;
+    const double pyqz = p.y * q.z, pzqy = p.z * q.y, pzqx = p.z * q.x, pxqz = p.x * q.z,
+                 pxqy = p.x * q.y, pyqx = p.y * q.x;
+    const double det = (pyqz - pzqy) * r.x + (pzqx - pxqz) * r.y + (pxqy - pyqx) * r.z;
+    const double permanent = (std::abs(pyqz) + std::abs(pzqy)) * std::abs(r.x) +
+                             (std::abs(pzqx) + std::abs(pxqz)) * std::abs(r.y) +
+                             (std::abs(pxqy) + std::abs(pyqx)) * std::abs(r.z);
+    const double largest =
+        std::max({std::abs(p.x), std::abs(p.y), std::abs(p.z), std::abs(q.x), std::abs(q.y),
+                  std::abs(q.z), std::abs(r.x), std::abs(r.y), std::abs(r.z)});
+    if (std::abs(det) > kBound3d * permanent + kUnderflowSlack && largest < kMaxDifference)
+        return sign(det);
+    return exact_orient3d(a, b, c, d);
+}
+
+bool is_flat(const Vec3& a, const Vec3& b, const Vec3& c) {
+    return projection_axis(a, b, c) == 3;
+}
+
+bool faces_cross(std::span<const Vec3> positions, Triangle f, Triangle g) {
+    const std::size_t n_shared = move_shared_first(f, g);
+    const Corners a = {positions[f[0]], positions[f[1]], positions[f[2]]};
+    const Corners b = {positions[g[0]], positions[g[1]], positions[g[2]]};
+    if (n_shared == 3)
+        return true;
+    if (n_shared == 2)
+        return folded(a[0], a[1], a[2], b[2]);
+    // When the free vertices of one face lie strictly on one side of the other's plane, the two
+    // meet at most in the vertex they share.
+    const auto sides = [n_shared](const Corners& plane, const Corners& points) {
+        std::array<int, 3> side{};
+        for (std::size_t k = n_shared; k < 3; ++k)
+            side[k] = orient3d(plane[0], plane[1], plane[2], points[k]);
+        return side;
+    };
+    const auto apart = [n_shared](const std::array<int, 3>& side) {
+        return side[1] * side[2] > 0 && (n_shared == 1 || side[0] * side[1] > 0);
+    };
+    const std::array<int, 3> side_b = sides(a, b);
+    if (apart(side_b))
+        return false;
+    const std::array<int, 3> side_a = sides(b, a);
+    if (apart(side_a))
+        return false;
+    // Where two convex faces meet in more than a shared vertex, an edge opposite to it (any edge,
+    // if none is shared) of one of them reaches the other.
+    for (std::size_t k = n_shared; k < (n_shared == 1 ? 2u : 3u); ++k) {
+        const std::size_t next = (k + 1) % 3;
+        if (segment_meets(a[k], a[next], side_a[k], side_a[next], b) ||
+            segment_meets(b[k], b[next], side_b[k], side_b[next], a))
+            return true;
+    }
+    return false;
+}
+
+std::size_t count_crossings(std::span<const Vec3> positions, std::span<const Triangle> faces) {
+    if (faces.empty())
+        return 0;
+    const BoxTree tree(positions, faces);
+    const std::span<const BoxTree::Face> sorted = tree.faces();
+    return tbb::parallel_reduce(
+        tbb::blocked_range<std::size_t>(0, sorted.size(), 256), std::size_t{0},
+        [&](const tbb::blocked_range<std::size_t>& range, std::size_t n) {
+            for (std::size_t i = range.begin(); i < range.end(); ++i)
+                tree.visit_from(i + 1, sorted[i].box, [&](std::size_t k) {
+                    if (BoxTree::overlap(sorted[i].box, sorted[k].box) &&
+                        faces_cross(positions, sorted[i].vertices, sorted[k].vertices))
+                        ++n;
+                });
+            return n;
+        },
+        [](std::size_t a, std::size_t b) { return a + b; });
+}
+
+} // namespace taihu

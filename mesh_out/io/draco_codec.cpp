@@ -1,0 +1,260 @@
+#include <algorithm>
+#include <cmath>
+#include <new>
+#include <numeric>
+
+#include <draco/attributes/attribute_quantization_transform.h>
+#include <draco/compression/decode.h>
+#include <draco/compression/expert_encode.h>
+#include <draco/compression/point_cloud/point_cloud_decoder.h>
+#include <draco/core/varint_decoding.h>
+#include <draco/metadata/metadata_decoder.h>
+
+#include "mesh_out/io/draco_codec_detail.h"
+#include "mesh_out/io/glb.h"
+#include "mesh_out/io/mesh_formats_detail.h"
+#include "stats/core/error.h"
+#include "stats/core/text.h"
+
+namespace taihu {
+namespace {
+
+constexpr int kNormalBits = 10, kSpeed = 3;
+/// A stream may claim this many faces whatever its length, and 64 more for each of its bytes: far
+/// more than any real mesh has, and little enough to allocate.
+constexpr std::uint64_t kFreeFaces = std::uint64_t{1} << 22, kFacesPerByte = 64;
+
+[[noreturn]] void fail(const std::string& where, const std::string& what) {
+    throw Error(Fault::bad_input, where + ": " + what + "; copy or export the file again");
+}
+
+void check_on_grid(const TriMesh& mesh, const PositionGrid& grid) {
+    int exponent = 0;
+    if (!(grid.step_m > 0) || std::frexp(grid.step_m, &exponent) != 0.5 || grid.bits < 1 ||
+        grid.bits > 18)
+        throw Error(Fault::bad_argument,
+                    "encode_draco: a grid of " + std::to_string(grid.bits) + " bits and step " +
+                        std::to_string(grid.step_m) +
+                        " m; give 1 to 18 bits and a step that is a power of two");
+    const double last = std::ldexp(1.0, grid.bits) - 1;
+    for (std::size_t i = 0; i < mesh.positions.size(); ++i)
+        for (int axis = 0; axis < 3; ++axis) {
+            const double p = mesh.positions[i][axis], origin = grid.origin[axis];
+            const double q = (p - origin) / grid.step_m; // exact: the step is a power of two
+            if (!(q >= 0 && q <= last) || q != std::floor(q) || origin + q * grid.step_m != p ||
+                static_cast<double>(static_cast<float>(p)) != p ||
+                static_cast<double>(static_cast<float>(origin)) != origin)
+                throw Error(Fault::bad_argument, "encode_draco: positions[" + std::to_string(i) +
+                                                     "] is not on the grid; snap the mesh to it");
+        }
+}
+
+int add_vectors(draco::Mesh& mesh, draco::GeometryAttribute::Type type,
+                const std::vector<Vec3>& vectors) {
+    draco::GeometryAttribute attribute;
+    attribute.Init(type, nullptr, 3, draco::DT_FLOAT32, false, 3 * sizeof(float), 0);
+    const int id = mesh.AddAttribute(attribute, true, static_cast<std::uint32_t>(vectors.size()));
+    for (std::size_t i = 0; i < vectors.size(); ++i) {
+        const float v[3] = {static_cast<float>(vectors[i].x), static_cast<float>(vectors[i].y),
+                            static_cast<float>(vectors[i].z)};
+        mesh.attribute(id)->SetAttributeValue(
+            draco::AttributeValueIndex(static_cast<std::uint32_t>(i)), v);
+    }
+    return id;
+}
+
+std::unique_ptr<draco::Mesh> to_draco(const TriMesh& mesh) {
+    auto made = std::make_unique<draco::Mesh>(); // it can be neither copied nor moved
+    draco::Mesh& out = *made;
+    out.set_num_points(static_cast<std::uint32_t>(mesh.positions.size()));
+    add_vectors(out, draco::GeometryAttribute::POSITION, mesh.positions);
+    if (!mesh.normals.empty())
+        add_vectors(out, draco::GeometryAttribute::NORMAL, mesh.normals);
+    out.SetNumFaces(mesh.triangles.size());
+    for (std::size_t i = 0; i < mesh.triangles.size(); ++i) {
+        const Triangle& t = mesh.triangles[i];
+        out.SetFace(draco::FaceIndex(static_cast<std::uint32_t>(i)),
+                    {draco::PointIndex(t[0]), draco::PointIndex(t[1]), draco::PointIndex(t[2])});
+    }
+    return made;
+}
+
+/// The corners' positions of all triangles, each begun at its least one, in order: equal for meshes
+/// that differ only in how they number things.
+std::vector<std::array<Vec3, 3>> sorted_faces(const TriMesh& mesh) {
+    const auto less = [](const Vec3& a, const Vec3& b) {
+        return a.x != b.x ? a.x < b.x : a.y != b.y ? a.y < b.y : a.z < b.z;
+    };
+    std::vector<std::array<Vec3, 3>> faces;
+    faces.reserve(mesh.triangles.size());
+    for (const Triangle& t : mesh.triangles) {
+        std::array<Vec3, 3> face = {mesh.positions[t[0]], mesh.positions[t[1]],
+                                    mesh.positions[t[2]]};
+        std::rotate(face.begin(), std::min_element(face.begin(), face.end(), less), face.end());
+        faces.push_back(face);
+    }
+    std::sort(faces.begin(), faces.end(), [&](const auto& a, const auto& b) {
+        return std::lexicographical_compare(a.begin(), a.end(), b.begin(), b.end(), less);
+    });
+    return faces;
+}
+
+/// Refuses a header whose numbers of faces or vertices are beyond reason, before Draco allocates
+/// for them.
+void check_claims(draco::DecoderBuffer buffer, const std::string& where) {
+    draco::DracoHeader header;
+    if (!draco::PointCloudDecoder::DecodeHeader(&buffer, &header).ok())
+        fail(where, "not a Draco stream");
+    if (header.encoder_type != draco::TRIANGULAR_MESH)
+        fail(where, "a Draco stream that is no mesh");
+    if (header.version_major != 2 || header.version_minor != 2)
+        fail(where, "Draco bit stream " + std::to_string(header.version_major) + '.' +
+                        std::to_string(header.version_minor) + ", 2.2 is read");
+    buffer.set_bitstream_version(DRACO_BITSTREAM_VERSION(2, 2));
+    draco::GeometryMetadata metadata;
+    if ((header.flags & METADATA_FLAG_MASK) != 0 &&
+        !draco::MetadataDecoder().DecodeGeometryMetadata(&buffer, &metadata))
+        fail(where, "the Draco metadata are broken");
+    if (header.encoder_method == draco::MESH_EDGEBREAKER_ENCODING)
+        buffer.Advance(1);        // the traversal method
+    for (int i = 0; i < 2; ++i) { // faces and points, or vertices and faces
+        std::uint32_t n = 0;
+        if (!draco::DecodeVarint(&n, &buffer))
+            fail(where, "the Draco stream ends within its header");
+        if (n > kFreeFaces + kFacesPerByte * static_cast<std::uint64_t>(buffer.remaining_size()))
+            fail(where, "a Draco stream with " + std::to_string(buffer.remaining_size()) +
+                            " bytes of data claims " + std::to_string(n) + " faces or vertices");
+    }
+}
+
+/// The vectors of `attribute`, one per point. Positions come quantised and are scaled here, in IEEE
+/// arithmetic as other decoders do it: the packaged libdraco is built with -ffast-math and its step
+/// is off in the last place (measured), which would move every position.
+std::vector<Vec3> vectors_of(const draco::Mesh& mesh, const draco::PointAttribute& attribute,
+                             const std::string& where) {
+    draco::AttributeQuantizationTransform transform;
+    const auto* data = attribute.GetAttributeTransformData();
+    const bool quantised = data &&
+                           data->transform_type() == draco::ATTRIBUTE_QUANTIZATION_TRANSFORM &&
+                           transform.InitFromAttribute(attribute);
+    float step = 0;
+    if (quantised) {
+        if (transform.quantization_bits() < 1 || transform.quantization_bits() > 30)
+            fail(where, "the Draco stream has a broken quantisation");
+        step = transform.range() / static_cast<float>((1 << transform.quantization_bits()) - 1);
+    }
+    std::vector<Vec3> out(mesh.num_points());
+    for (std::uint32_t i = 0; i < mesh.num_points(); ++i) {
+        float v[3] = {};
+        const auto index = attribute.mapped_index(draco::PointIndex(i));
+        if (index.value() >= attribute.size() || !attribute.ConvertValue<float, 3>(index, v))
+            fail(where, "the Draco stream has a broken attribute");
+        for (int axis = 0; quantised && axis < 3; ++axis)
+            v[axis] = v[axis] * step + transform.min_value(axis);
+        out[i] = {v[0], v[1], v[2]};
+        if (!is_finite(out[i]))
+            fail(where, "Draco point " + std::to_string(i) + " is not finite");
+    }
+    return out;
+}
+
+std::unique_ptr<draco::Mesh> decode(std::string_view bytes, const std::string& where) {
+    draco::DecoderBuffer buffer;
+    buffer.Init(bytes.data(), bytes.size());
+    try {
+        check_claims(buffer, where);
+        draco::Decoder decoder;
+        decoder.SetSkipAttributeTransform(draco::GeometryAttribute::POSITION);
+        auto result = decoder.DecodeMeshFromBuffer(&buffer);
+        if (!result.ok())
+            fail(where, "Draco says '" + printable(result.status().error_msg(), 80) + "'");
+        return std::move(result).value();
+    } catch (const std::bad_alloc&) {
+        fail(where, "the Draco stream asks for more memory than there is");
+    } catch (const std::length_error&) {
+        fail(where, "the Draco stream asks for more memory than there is");
+    }
+}
+
+} // namespace
+
+DracoMesh decode_draco_mesh(std::string_view bytes, const std::string& where) {
+    const auto decoded = decode(bytes, where);
+    const auto* positions = decoded->GetNamedAttribute(draco::GeometryAttribute::POSITION);
+    const auto* normals = decoded->GetNamedAttribute(draco::GeometryAttribute::NORMAL);
+    if (!positions || positions->num_components() != 3)
+        fail(where, "the Draco stream has no positions");
+    if (decoded->num_faces() == 0)
+        fail(where, "the Draco stream has no face");
+    DracoMesh out;
+    out.mesh.positions = vectors_of(*decoded, *positions, where);
+    out.position_id = positions->unique_id();
+    if (normals && normals->num_components() == 3) {
+        out.mesh.normals = vectors_of(*decoded, *normals, where);
+        out.normal_id = normals->unique_id();
+    }
+    for (int i = 0; i < decoded->num_attributes(); ++i)
+        out.ids.push_back(decoded->attribute(i)->unique_id());
+    out.mesh.triangles.resize(decoded->num_faces());
+    for (std::uint32_t i = 0; i < decoded->num_faces(); ++i)
+        for (std::size_t k = 0; k < 3; ++k) {
+            const std::uint32_t corner = decoded->face(draco::FaceIndex(i))[k].value();
+            if (corner >= out.mesh.positions.size())
+                fail(where, "Draco face " + std::to_string(i) + " names point " +
+                                std::to_string(corner) + " of " +
+                                std::to_string(out.mesh.positions.size()));
+            out.mesh.triangles[i][k] = corner;
+        }
+    return out;
+}
+
+TriMesh decode_draco(std::string_view bytes, const std::string& where) {
+    return decode_draco_mesh(bytes, where).mesh;
+}
+
+EncodedLevel encode_draco(const TriMesh& mesh, const PositionGrid& grid) {
+    check_writable(mesh, "encode_draco");
+    check_on_grid(mesh, grid);
+    const auto source = to_draco(mesh);
+    draco::ExpertEncoder encoder(*source);
+    encoder.SetEncodingMethod(draco::MESH_EDGEBREAKER_ENCODING);
+    encoder.SetSpeedOptions(kSpeed, kSpeed);
+    encoder.SetTrackEncodedProperties(true);
+    const float origin[3] = {static_cast<float>(grid.origin.x), static_cast<float>(grid.origin.y),
+                             static_cast<float>(grid.origin.z)};
+    // Draco's step is range / (2^bits - 1) in float; so it is grid.step_m without rounding.
+    const auto n_steps = static_cast<float>((1 << grid.bits) - 1);
+    const auto range = static_cast<float>(grid.step_m) * n_steps;
+    encoder.SetAttributeExplicitQuantization(kDracoPositionId, grid.bits, 3, origin, range);
+    if (!mesh.normals.empty())
+        encoder.SetAttributeQuantization(kDracoNormalId, kNormalBits);
+    const auto give_up = [](const std::string& what) {
+        throw Error(Fault::numeric, "encode_draco: " + what +
+                                        "; give a closed 2-manifold whose vertices are all used");
+    };
+    if (!(range / n_steps == static_cast<float>(grid.step_m)))
+        give_up("the grid's step does not fit Draco's arithmetic");
+    draco::EncoderBuffer buffer;
+    if (const draco::Status status = encoder.EncodeToBuffer(&buffer); !status.ok())
+        give_up("Draco says '" + printable(status.error_msg(), 80) + "'");
+
+    EncodedLevel level;
+    level.draco.assign(buffer.data(), buffer.size());
+    DracoMesh decoded = decode_draco_mesh(level.draco, "encode_draco");
+    level.decoded = std::move(decoded.mesh);
+    const std::size_t n_points = level.decoded.positions.size();
+    const std::size_t n_faces = level.decoded.triangles.size();
+    if (n_points != mesh.positions.size() || n_faces != mesh.triangles.size() ||
+        n_points != encoder.num_encoded_points() || n_faces != encoder.num_encoded_faces())
+        give_up(std::to_string(mesh.positions.size()) + " points and " +
+                std::to_string(mesh.triangles.size()) + " faces came back as " +
+                std::to_string(n_points) + " and " + std::to_string(n_faces));
+    if (decoded.position_id != kDracoPositionId ||
+        decoded.normal_id != (mesh.normals.empty() ? std::nullopt : std::optional(kDracoNormalId)))
+        give_up("Draco numbered the attributes in another way");
+    if (sorted_faces(level.decoded) != sorted_faces(mesh))
+        give_up("a face came back with other positions");
+    return level;
+}
+
+} // namespace taihu

@@ -1,0 +1,26 @@
+#pragma once
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "stats/core/tri_mesh.h"
+
+namespace taihu {
+
+/// Draco's unique ids of the attributes that encode_draco() writes.
+inline constexpr std::uint32_t kDracoPositionId = 0, kDracoNormalId = 1;
+
+/// A decoded mesh with the attribute ids that glTF refers to.
+struct DracoMesh {
+    TriMesh mesh;
+    std::uint32_t position_id = 0;
+    std::optional<std::uint32_t> normal_id;
+    std::vector<std::uint32_t> ids; ///< of all attributes
+};
+
+/// decode_draco() and the ids.
+DracoMesh decode_draco_mesh(std::string_view bytes, const std::string& where);
+
+} // namespace taihu

@@ -1,0 +1,44 @@
+#pragma once
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "mesh_out/position_grid.h"
+#include "stats/core/tri_mesh.h"
+
+namespace taihu {
+
+/// A level of detail as it stands in a file.
+struct EncodedLevel {
+    std::string draco; ///< one Draco mesh bit stream
+    TriMesh decoded;   ///< what decoding those bytes gives: positions, normals, triangles
+    double screen_coverage =
+        0; ///< MSFT_screencoverage: share of the screen down to which it is used
+};
+
+/// Compress with Draco's ExpertEncoder: edgebreaker, positions on `grid` without loss, normals
+/// (when the mesh has them) in 10 bits, speed 3; then decode the bytes again. \throws Error numeric
+/// when the decoded mesh has other counts, or a position that is not one of
+///   the mesh's; bad_argument when a position is not on the grid.
+EncodedLevel encode_draco(const TriMesh& mesh, const PositionGrid& grid);
+
+/// \param where  stands for the file's name in messages.
+/// \throws Error bad_input: not a Draco mesh, cut short, no positions, an index past the last
+/// point,
+///   a non-finite position.
+TriMesh decode_draco(std::string_view bytes, const std::string& where);
+
+struct GlbSettings {
+    std::string name = "rock"; ///< of the node and the mesh; levels are name, name_lod1, ...
+    std::string recipe{};      ///< JSON text kept in asset.extras.taihu_recipe, or empty
+    double roughness = 0.9;    ///< of the one material, 0..1
+    double grey = 0.56;        ///< base colour, linear, 0..1
+};
+
+/// A GLB of Draco levels, finest first: KHR_draco_mesh_compression (required), and with more than
+/// one level MSFT_lod on the first node and MSFT_screencoverage in its extras. Accessor counts,
+/// minima and maxima are those of the decoded arrays. The same input gives the same bytes.
+std::string format_glb(std::span<const EncodedLevel> levels, const GlbSettings& settings = {});
+
+} // namespace taihu

@@ -1,0 +1,27 @@
+#pragma once
+#include <cstdint>
+#include <optional>
+#include <span>
+#include <string>
+#include <string_view>
+
+namespace taihu {
+
+/// A finite number that fills the whole of `text` (a leading + is allowed), read without locale;
+/// nothing for anything else, `nan`, `inf` and overflow included.
+std::optional<double> parse_number(std::string_view text);
+
+/// A decimal integer that fills the whole of `text`; nothing for anything else.
+std::optional<std::int64_t> parse_integer(std::string_view text);
+
+/// `text` without spaces and tabs at its ends.
+std::string_view trimmed(std::string_view text);
+
+/// `; did you mean 'NAME'?` for the nearest of `known` names, by edit distance, or an empty string
+/// when none is near.
+std::string did_you_mean(std::string_view name, std::span<const std::string_view> known);
+
+/// `text` fit for one line of a message: control characters escaped, cut at `max_length`.
+std::string printable(std::string_view text, std::size_t max_length = 40);
+
+} // namespace taihu

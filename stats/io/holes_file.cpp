@@ -1,0 +1,62 @@
+#include "stats/io/holes_file.h"
+
+#include <array>
+#include <cmath>
+
+#include "stats/core/error.h"
+#include "stats/core/file.h"
+#include "stats/io/table_detail.h"
+#include "stats/number_detail.h"
+
+namespace taihu {
+
+std::vector<Sphere> read_holes(const std::filesystem::path& path) {
+    static constexpr std::array<std::string_view, 5> kKnown = {"x_m", "y_m", "z_m", "radius_m",
+                                                               "diameter_m"};
+    const std::string text = read_file(path, std::size_t{1} << 30);
+    const Table table(text, base_name(path));
+    table.check_header(kKnown);
+    const auto x = table.column("x_m"), y = table.column("y_m"), z = table.column("z_m");
+    const auto diameter = table.find("diameter_m");
+    if (diameter && table.find("radius_m"))
+        table.refuse_line(0, "has radius_m and diameter_m; keep one of them");
+    const std::size_t size = diameter ? *diameter : table.column("radius_m");
+
+    std::vector<Sphere> holes;
+    holes.reserve(table.n_rows());
+    for (std::size_t row = 0; row < table.n_rows(); ++row) {
+        const double radius = table.number(row, size) * (diameter ? 0.5 : 1);
+        if (!(radius > 0))
+            table.refuse(row, size, "must be > 0, drop the row or fix the number");
+        holes.push_back(
+            {{table.number(row, x), table.number(row, y), table.number(row, z)}, radius});
+    }
+    return holes;
+}
+
+std::string format_holes(std::span<const Sphere> holes, std::span<const std::string> comments) {
+    std::string text;
+    for (const std::string& comment : comments) {
+        text += "# ";
+        for (const char c : comment) {
+            text += c == '\r' ? ' ' : c;
+            if (c == '\n')
+                text += "# ";
+        }
+        text += '\n';
+    }
+    text += "x_m,y_m,z_m,radius_m\n";
+    for (std::size_t i = 0; i < holes.size(); ++i) {
+        const Sphere& hole = holes[i];
+        if (!is_finite(hole.center) || !(hole.radius_m > 0 && std::isfinite(hole.radius_m)))
+            throw Error(Fault::bad_argument, "holes[" + std::to_string(i) + "]: radius_m is " +
+                                                 shortest(hole.radius_m) +
+                                                 "; centre and radius must be finite, radius > 0");
+        for (const double value : {hole.center.x, hole.center.y, hole.center.z})
+            text += shortest(value) + ',';
+        text += shortest(hole.radius_m) + '\n';
+    }
+    return text;
+}
+
+} // namespace taihu

@@ -1,0 +1,128 @@
+#include "vdb_ops/carve.h"
+
+#include <numbers>
+
+#include <tbb/global_control.h>
+
+#include "stats/core/rng.h"
+#include "tests/support/errors.h"
+#include "tests/support/grids.h"
+
+namespace taihu {
+namespace {
+
+const std::vector<Sphere> kDisjoint = {{{0.4, 0, 0}, 0.2}, {{-0.4, 0, 0}, 0.2}, {{0, 0.5, 0}, 0.1}};
+
+std::vector<Sphere> random_holes(std::size_t n) {
+    std::vector<Sphere> holes;
+    for (std::size_t i = 0; i < n; ++i) {
+        const Rng rng{11, 1};
+        holes.push_back({{2.4 * rng.uniform(i, 0) - 1.2, 2.4 * rng.uniform(i, 1) - 1.2,
+                          2.4 * rng.uniform(i, 2) - 1.2},
+                         0.02 + 0.2 * rng.uniform(i, 3)});
+    }
+    return holes;
+}
+
+TEST(Carve, RemovesTheVolumeOfDisjointHoles) {
+    double expected_m3 = 0;
+    for (const Sphere& h : kDisjoint)
+        expected_m3 += 4.0 / 3 * std::numbers::pi * std::pow(h.radius_m, 3);
+    const CarveResult result = carve(*ball_rock(1, 0.01), kDisjoint);
+    // volume_m3(): below 0.05 (voxel / r)^2 of each hole, 5e-4 of the smallest.
+    EXPECT_NEAR(result.removed_m3, expected_m3, 3e-4 * expected_m3);
+    EXPECT_NEAR(result.base_m3, 4.0 / 3 * std::numbers::pi, 1e-5 * 4.19);
+}
+
+TEST(Carve, SphereMinusSphereHasItsAnalyticVolume) {
+    // A unit ball minus a ball of radius 1/2 centred on its surface: the lens of two spherical caps.
+    const double r = 0.5, d = 1;
+    const double lens = std::numbers::pi * std::pow(1 + r - d, 2) *
+                        (d * d + 2 * d * r - 3 * r * r + 2 * d + 6 * r - 3) / (12 * d);
+    const double removed = carve(*ball_rock(1, 0.01), std::vector<Sphere>{{{0, 0, 1}, r}}).removed_m3;
+    EXPECT_NEAR(removed, lens, 2e-3 * lens); // the rim is resolved to a fraction of a voxel only
+}
+
+TEST(Carve, IsTheMaximumOfRockAndHolesAtEveryVoxel) {
+    const auto rock = ball_rock(1, 0.04);
+    const std::vector<Sphere> holes = random_holes(60);
+    const auto carved = carve(*rock, holes).rock;
+    const auto accessor = carved->getConstAccessor();
+    for (int i = -28; i <= 28; ++i)
+        for (int j = -28; j <= 28; ++j)
+            for (int k = -28; k <= 28; ++k) {
+                const Vec3 p{i * 0.04, j * 0.04, k * 0.04};
+                double exact = length(p) - 1;
+                for (const Sphere& h : holes)
+                    exact = std::max(exact, h.radius_m - length(p - h.center));
+                // Float on tens of voxels of 4 cm.
+                ASSERT_NEAR(accessor.getValue(openvdb::Coord(i, j, k)), std::clamp(exact, -0.12, 0.12),
+                            2e-6);
+            }
+}
+
+TEST(Carve, OrderOfTheHolesChangesNoBit) {
+    const auto rock = ball_rock(1, 0.03);
+    std::vector<Sphere> holes = random_holes(300);
+    const std::string forward = grid_hash(*carve(*rock, holes).rock);
+    std::reverse(holes.begin(), holes.end());
+    EXPECT_EQ(grid_hash(*carve(*rock, holes).rock), forward);
+}
+
+TEST(Carve, IsBitIdenticalOnOneThreadAndMany) {
+    const auto rock = ball_rock(1, 0.02);
+    const std::vector<Sphere> holes = random_holes(300);
+    const std::string many = grid_hash(*carve(*rock, holes).rock);
+    const tbb::global_control one(tbb::global_control::max_allowed_parallelism, 1);
+    EXPECT_EQ(grid_hash(*carve(*rock, holes).rock), many);
+}
+
+TEST(Carve, AnotherHoleNeverAddsVolume) {
+    const auto rock = ball_rock(1, 0.04);
+    const std::vector<Sphere> holes = random_holes(12);
+    double removed = 0;
+    for (std::size_t n = 1; n <= holes.size(); ++n) {
+        const double now = carve(*rock, std::span(holes).first(n)).removed_m3;
+        EXPECT_GE(now, removed - 1e-12);
+        removed = now;
+    }
+}
+
+TEST(Carve, HolesThatCoverTheRockLeaveNothing) {
+    const CarveResult result = carve(*ball_rock(), std::vector<Sphere>{{{0.1, 0, 0}, 2}});
+    EXPECT_EQ(result.rock->tree().leafCount(), 0u);
+    EXPECT_NEAR(result.porosity(), 1, 1e-12);
+}
+
+TEST(Carve, HolesFarAwayOrHugeAreHandled) {
+    const auto rock = ball_rock();
+    EXPECT_EQ(grid_hash(*carve(*rock, std::vector<Sphere>{{{1e6, 0, 0}, 1}}).rock), grid_hash(*rock));
+    // A ball of 500 m through the middle: nearly half of the rock goes (lens of two caps).
+    // Float holds 1e4 voxels to 1e-3 of one.
+    const double half = carve(*rock, std::vector<Sphere>{{{500, 0, 0}, 500}}).removed_m3;
+    EXPECT_NEAR(half, std::numbers::pi * 3997 / 6000, 1e-3);
+}
+
+TEST(Carve, CountsHolesThatTheVoxelDoesNotResolve) {
+    const auto result = carve(*ball_rock(), std::vector<Sphere>{{{0.5, 0, 0}, 0.07}, {{}, 0.08}});
+    EXPECT_EQ(result.n_unresolved, 1u); // 1.5 voxels are 0.075 m
+}
+
+TEST(Carve, NamesTheHoleWithANegativeRadius) {
+    const std::vector<Sphere> bad = {{{0, 0, 0}, 0.1}, {{0, 0, 0}, -0.02}};
+    expect_error(Fault::bad_argument, "holes[1].radius_m", [&] { carve(*ball_rock(), bad); });
+}
+
+class Cancelled final : public Progress {
+    void stage(std::string_view) override {}
+    void fraction(double) override {}
+    bool cancelled() const override { return true; }
+};
+
+TEST(Carve, StopsWhenItIsTold) {
+    Cancelled progress;
+    expect_error(Fault::cancelled, "cancelled", [&] { carve(*ball_rock(), kDisjoint, &progress); });
+}
+
+} // namespace
+} // namespace taihu

@@ -1,0 +1,102 @@
+#include "vdb_ops/clean.h"
+
+#include <numbers>
+
+#include <tbb/global_control.h>
+
+#include "stats/core/rng.h"
+#include "tests/support/errors.h"
+#include "tests/support/grids.h"
+#include "vdb_ops/carve.h"
+#include "vdb_ops/volume.h"
+
+namespace taihu {
+namespace {
+
+constexpr double kPi = std::numbers::pi;
+
+double ball_m3(double r) { return 4.0 / 3 * kPi * r * r * r; }
+
+openvdb::FloatGrid::Ptr balls(std::vector<Sphere> spheres, double voxel_m = 0.05) {
+    return rasterize(BallsField(spheres), {voxel_m, {}, 3});
+}
+
+TEST(Clean, KeepsTheLargestPiece) {
+    const auto three = balls({{{}, 1}, {{2, 0, 0}, 0.5}, {{-2, 0, 0}, 0.4}});
+    const CleanResult result = clean(*three);
+    EXPECT_EQ(result.n_pieces, 3u);
+    EXPECT_EQ(result.n_pieces_removed, 2u);
+    EXPECT_EQ(result.n_bubbles, 0u);
+    EXPECT_NEAR(result.removed_m3, ball_m3(0.5) + ball_m3(0.4), 1e-3);
+    EXPECT_EQ(grid_hash(*result.solid), grid_hash(*ball_rock()));
+}
+
+TEST(Clean, KeepsAsManyAsAskedFor) {
+    const auto three = balls({{{}, 1}, {{2, 0, 0}, 0.5}, {{-2, 0, 0}, 0.4}});
+    EXPECT_EQ(clean(*three, {.n_pieces = 2}).n_pieces_removed, 1u);
+    const CleanResult all = clean(*three, {.n_pieces = std::nullopt});
+    EXPECT_EQ(all.n_pieces_removed, 0u);
+    EXPECT_EQ(grid_hash(*all.solid), grid_hash(*three));
+}
+
+TEST(Clean, FillsSealedBubblesAndKeepsOpenHoles) {
+    const auto rock = ball_rock();
+    const std::vector<Sphere> open = {{{0, 0, 0.9}, 0.4}};
+    std::vector<Sphere> both = open;
+    both.push_back({{0, 0, -0.3}, 0.3});
+    const auto carved = carve(*rock, both).rock;
+    const CleanResult result = clean(*carved);
+    EXPECT_EQ(result.n_bubbles, 1u);
+    EXPECT_EQ(result.n_bubbles_filled, 1u);
+    EXPECT_NEAR(result.filled_m3, ball_m3(0.3), 1e-3);
+    const auto expected = carve(*rock, open).rock;
+    for (auto it = expected->cbeginValueOn(); it; ++it)
+        ASSERT_NEAR(result.solid->tree().getValue(it.getCoord()), it.getValue(), 1e-6);
+    EXPECT_EQ(result.solid->activeVoxelCount(), expected->activeVoxelCount());
+    EXPECT_EQ(grid_hash(*clean(*carved, {.fill_bubbles = false}).solid), grid_hash(*carved));
+}
+
+TEST(Clean, ALargeBubbleWithUniformBlocksIsFilled) {
+    const auto rock = ball_rock(4, 0.05); // 160 voxels across, bubble of 80
+    const CleanResult result = clean(*carve(*rock, std::vector<Sphere>{{{}, 2}}).rock);
+    EXPECT_EQ(result.n_bubbles_filled, 1u);
+    EXPECT_NEAR(result.filled_m3, ball_m3(2), 0.01);
+    EXPECT_EQ(grid_hash(*result.solid), grid_hash(*rock));
+}
+
+TEST(Clean, RebuildsDistancesBetweenNearSurfaces) {
+    // A small ball two voxels beside a large one: removed, the gap's distances are the large one's again.
+    const auto two = balls({{{}, 1}, {{1.4, 0, 0}, 0.3}});
+    const CleanResult result = clean(*two);
+    const auto expected = ball_rock();
+    for (auto it = expected->cbeginValueOn(); it; ++it)
+        ASSERT_NEAR(result.solid->tree().getValue(it.getCoord()), it.getValue(), 0.2 * 0.05) << it.getCoord();
+}
+
+TEST(Clean, OfAHoledRockLeavesOnePieceWithoutBubblesAndIsIdempotent) {
+    std::vector<Sphere> holes;
+    for (std::uint64_t i = 0; i < 400; ++i) {
+        const Rng rng{21, 1};
+        holes.push_back({{2 * rng.uniform(i, 0) - 1, 2 * rng.uniform(i, 1) - 1, 2 * rng.uniform(i, 2) - 1},
+                         0.05 + 0.12 * rng.uniform(i, 3)});
+    }
+    const auto carved = carve(*ball_rock(1, 0.025), holes).rock;
+    const CleanResult once = clean(*carved);
+    EXPECT_GT(once.n_pieces_removed, 0u);
+    EXPECT_GT(once.n_bubbles_filled, 0u);
+    EXPECT_NEAR(volume_m3(*once.solid), volume_m3(*carved) - once.removed_m3 + once.filled_m3, 1e-9);
+    const CleanResult twice = clean(*once.solid);
+    EXPECT_EQ(twice.n_pieces, 1u);
+    EXPECT_EQ(twice.n_bubbles, 0u);
+    EXPECT_EQ(grid_hash(*twice.solid), grid_hash(*once.solid));
+    const tbb::global_control one(tbb::global_control::max_allowed_parallelism, 1);
+    EXPECT_EQ(grid_hash(*clean(*carved).solid), grid_hash(*once.solid));
+}
+
+TEST(Clean, RefusesNothing) {
+    const auto gone = carve(*ball_rock(), std::vector<Sphere>{{{}, 2}}).rock;
+    expect_error(Fault::bad_input, "nothing is left", [&] { clean(*gone); });
+}
+
+} // namespace
+} // namespace taihu

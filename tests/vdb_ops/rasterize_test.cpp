@@ -1,0 +1,78 @@
+#include "vdb_ops/rasterize.h"
+
+#include <tbb/global_control.h>
+
+#include "tests/support/errors.h"
+#include "tests/support/grids.h"
+#include "vdb_ops/level_set_field.h"
+
+namespace taihu {
+namespace {
+
+TEST(Rasterize, BallIsExactInItsBandAndSignedEverywhere) {
+    const Vec3 center{0.13, -0.27, 0.41};
+    const BallsField field(std::array<Sphere, 1>{{{center, 1}}});
+    const auto grid = rasterize(field, {0.05, {}, 3});
+    const auto accessor = grid->getConstAccessor();
+    for (int i = -30; i <= 30; ++i)
+        for (int j = -30; j <= 30; ++j)
+            for (int k = -30; k <= 30; ++k) {
+                const double exact = length(Vec3{i * 0.05, j * 0.05, k * 0.05} - center) - 1;
+                const float value = accessor.getValue(openvdb::Coord(i, j, k));
+                ASSERT_EQ(value < 0, exact < 0) << i << ' ' << j << ' ' << k;
+                // Float: 1e-6 voxel relative to coordinates of a few tens of voxels.
+                ASSERT_NEAR(value, std::clamp(exact, -0.15, 0.15), 1e-6);
+                ASSERT_EQ(accessor.isValueOn(openvdb::Coord(i, j, k)), std::fabs(value) < 0.15f);
+            }
+}
+
+TEST(Rasterize, InsideOfALargeSolidIsFilledBetweenFarLeaves) {
+    const auto grid = ball_rock(10, 0.05); // 400 voxels across: uniform nodes in the middle
+    const auto accessor = grid->getConstAccessor();
+    for (int i = -190; i <= 190; i += 10)
+        for (int j = -60; j <= 60; j += 10)
+            ASSERT_LT(accessor.getValue(openvdb::Coord(i / 2, j, i / 2)), 0) << i << ' ' << j;
+    EXPECT_GT(accessor.getValue(openvdb::Coord(0, 0, 230)), 0);
+}
+
+TEST(Rasterize, IsBitIdenticalOnOneThreadAndMany) {
+    const std::string many = grid_hash(*ball_rock(1, 0.01));
+    const tbb::global_control one(tbb::global_control::max_allowed_parallelism, 1);
+    EXPECT_EQ(grid_hash(*ball_rock(1, 0.01)), many);
+}
+
+TEST(Rasterize, HonoursTheOriginOfTheLattice) {
+    const BallsField field(std::array<Sphere, 1>{{{{1, 2, 3}, 0.5}}});
+    const auto here = rasterize(field, {0.05, {0.01, 0.02, 0.03}, 3});
+    EXPECT_NEAR(here->tree().getValue(here->transform().worldToIndexCellCentered({1, 2, 3.5})), 0, 0.03);
+    const Lattice lattice = lattice_of(*here);
+    EXPECT_NEAR(lattice.origin.z, 0.03, 1e-12);
+    EXPECT_NEAR(lattice.voxel_m, 0.05, 1e-12);
+}
+
+TEST(Rasterize, RefusesLatticesOutOfRange) {
+    const BallsField field(std::array<Sphere, 1>{{{{}, 1}}});
+    expect_error(Fault::bad_argument, "voxel_m is 0", [&] { rasterize(field, {0, {}, 3}); });
+    expect_error(Fault::bad_argument, "half_width_vox", [&] { rasterize(field, {0.1, {}, 1}); });
+    expect_error(Fault::bad_argument, "2^30", [&] { rasterize(field, {1e-10, {}, 3}); });
+}
+
+TEST(LevelSetField, GivesItsOwnGridBack) {
+    const auto grid = ball_rock();
+    EXPECT_EQ(grid_hash(*rasterize(LevelSetField(grid), lattice_of(*grid))), grid_hash(*grid));
+}
+
+TEST(LevelSetField, RefusesAnotherLattice) {
+    const auto grid = ball_rock();
+    const LevelSetField field(grid);
+    expect_error(Fault::bad_argument, "sampled at 0.05", [&] { rasterize(field, {0.04, {}, 3}); });
+}
+
+TEST(LatticeOf, NamesAGridThatIsNoLevelSet) {
+    auto fog = openvdb::FloatGrid::create(0);
+    fog->setName("density");
+    expect_error(Fault::bad_argument, "grid 'density': not a level set", [&] { lattice_of(*fog); });
+}
+
+} // namespace
+} // namespace taihu

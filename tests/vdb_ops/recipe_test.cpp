@@ -1,0 +1,39 @@
+#include "vdb_ops/recipe.h"
+
+#include "tests/support/errors.h"
+
+namespace taihu {
+namespace {
+
+TEST(Recipe, IsWrittenInOneOrderAndShortestNumbers) {
+    Placement placement;
+    placement.porosity = 0.25;
+    placement.scale_m = 0.1;
+    placement.seed = 7;
+    const std::string solid = clean_node(
+        difference_node(shape_node({.kind = ShapeKind::box, .size_m = {1, 2, 0.5}}),
+                        holes_node("law.json", "ab", placement)),
+        1, true);
+    EXPECT_EQ(format_recipe(solid, 0.01, 7),
+              R"({"taihu_recipe":1,"seed":7,"voxel_m":0.01,"solid":{"clean":{"of":{"difference":)"
+              R"({"of":[{"box":{"size_m":[1.0,2.0,0.5]}},{"holes":{"law":"law.json","sha256":"ab",)"
+              R"("porosity":0.25,"scale_m":0.1,"seed":7}}]}},"pieces":1,"bubbles":"fill"}}})");
+}
+
+TEST(Recipe, ASolidCanBeBuiltOn) {
+    const std::string ball = shape_node({.kind = ShapeKind::sphere});
+    const std::string recipe = format_recipe(ball, 0.01, 0);
+    EXPECT_EQ(recipe_solid(recipe), ball);
+    EXPECT_EQ(recipe_solid(with_lod(recipe, {4, 0.005, 2})), ball);
+    EXPECT_THAT(with_lod(recipe, {4, 0.005, 2}),
+                testing::HasSubstr(R"("lod":{"levels":4,"bound_m":0.005,"factor":2.0})"));
+}
+
+TEST(Recipe, WhatIsNoneIsSaid) {
+    EXPECT_EQ(recipe_solid("{}"), std::nullopt);
+    EXPECT_EQ(recipe_solid("not json"), std::nullopt);
+    expect_error(Fault::bad_input, "not a taihu recipe", [] { with_lod("[]", {}); });
+}
+
+} // namespace
+} // namespace taihu

@@ -1,0 +1,29 @@
+#include "vdb_ops/carve.h"
+
+#include <memory>
+
+#include "vdb_ops/balls_field.h"
+#include "vdb_ops/csg_field.h"
+#include "vdb_ops/level_set_field.h"
+#include "vdb_ops/rasterize.h"
+#include "vdb_ops/volume.h"
+
+namespace taihu {
+
+CarveResult carve(const openvdb::FloatGrid& rock, std::span<const Sphere> holes,
+                  Progress* progress) {
+    const Lattice lattice = lattice_of(rock);
+    // Fields share what they are made of; the caller's grid outlives this call.
+    const openvdb::FloatGrid::ConstPtr borrowed(&rock, [](const openvdb::FloatGrid*) {});
+    const DifferenceField difference(std::make_shared<LevelSetField>(borrowed),
+                                     std::make_shared<BallsField>(holes));
+    CarveResult result;
+    result.rock = rasterize(difference, lattice, progress);
+    for (const Sphere& hole : holes)
+        result.n_unresolved += hole.radius_m < 1.5 * lattice.voxel_m;
+    result.base_m3 = volume_m3(rock);
+    result.removed_m3 = result.base_m3 - volume_m3(*result.rock);
+    return result;
+}
+
+} // namespace taihu

@@ -1,0 +1,54 @@
+#pragma once
+#include <memory>
+
+#include <openvdb/openvdb.h>
+
+#include "stats/core/vec3.h"
+
+namespace taihu {
+
+/// Where a field is sampled: voxel (i, j, k) lies at origin + voxel_m * (i, j, k).
+struct Lattice {
+    double voxel_m = 0;         ///< > 0
+    Vec3 origin;                ///< world position of voxel (0, 0, 0) [m]
+    float half_width_vox = 3;   ///< distances beyond this are clamped to it [voxels], 2..16
+};
+
+/// What is known of a region without evaluating it: further than the half width from the surface on
+/// one side, or perhaps near it.
+enum class Cover { outside, inside, surface };
+
+/// A field inside one block of 64^3 voxels, for one thread.
+class BlockSampler {
+public:
+    static constexpr int kBlock = 64; ///< voxels along an edge of a block
+    static constexpr int kLeaf = 8;   ///< and of a leaf
+
+    virtual ~BlockSampler() = default;
+    /// Conservative and cheap; `leaf` is the first voxel of a leaf of this block.
+    virtual Cover cover(const openvdb::Coord& leaf) const = 0;
+    /// The 512 signed distances of a leaf in voxels, clamped to the half width, negative inside,
+    /// z fastest; meaningful for leaves whose cover() is `surface`.
+    virtual void values(const openvdb::Coord& leaf, float* out) = 0;
+};
+
+/// A field prepared for one lattice. Thread-safe.
+class LatticeField {
+public:
+    virtual ~LatticeField() = default;
+    /// All voxels outside this box are outside the solid by at least the half width.
+    virtual openvdb::CoordBBox bounds() const = 0;
+    /// The part of the field that is enough inside the block whose first voxel is `block`: null and
+    /// `cover` when the whole block is on one side.
+    virtual std::unique_ptr<BlockSampler> open(const openvdb::Coord& block, Cover& cover) const = 0;
+};
+
+/// A solid as a signed distance: world units, negative inside, 1-Lipschitz, never over-estimating.
+class Field {
+public:
+    virtual ~Field() = default;
+    /// Prepare for sampling on `lattice`. The field must outlive what it returns.
+    virtual std::unique_ptr<LatticeField> on(const Lattice& lattice) const = 0;
+};
+
+} // namespace taihu

@@ -1,0 +1,20 @@
+#pragma once
+#include <openvdb/openvdb.h>
+
+#include "vdb_ops/field.h"
+
+namespace taihu {
+
+/// A level set as a field on its own lattice: values are handed on as they stand.
+class LevelSetField final : public Field {
+public:
+    /// \throws Error bad_argument as lattice_of().
+    explicit LevelSetField(openvdb::FloatGrid::ConstPtr grid);
+    /// \throws Error bad_argument: a lattice other than the grid's own.
+    std::unique_ptr<LatticeField> on(const Lattice& lattice) const override;
+
+private:
+    openvdb::FloatGrid::ConstPtr grid_;
+};
+
+} // namespace taihu

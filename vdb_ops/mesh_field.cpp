@@ -1,0 +1,299 @@
+#include "vdb_ops/mesh_field.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+
+#include <tbb/blocked_range.h>
+#include <tbb/parallel_for.h>
+
+#include "stats/core/error.h"
+#include "vdb_ops/columns_detail.h"
+#include "vdb_ops/kernels_detail.h"
+
+namespace taihu {
+namespace {
+
+using openvdb::Coord;
+using openvdb::CoordBBox;
+constexpr int kBlock = BlockSampler::kBlock;
+constexpr int kLeaf = BlockSampler::kLeaf;
+constexpr int kAcross = kBlock / kLeaf;
+constexpr std::size_t kLeaves = std::size_t{kAcross} * kAcross * kAcross;
+
+LeafTriangle leaf_triangle(const std::array<Vec3, 3>& p, std::uint32_t shell, float half_width) {
+    LeafTriangle t;
+    t.shell = shell;
+    const std::array<Vec3, 3> e = {p[1] - p[0], p[2] - p[1], p[0] - p[2]};
+    Vec3 n = cross(e[0], e[1]);
+    const double longest2 =
+        std::max({length_squared(e[0]), length_squared(e[1]), length_squared(e[2])});
+    // A needle has no normal worth the name: its edges are all of it.
+    n = length_squared(n) <= 1e-14 * longest2 * longest2 ? Vec3{} : normalized(n);
+    for (std::size_t k = 0; k < 3; ++k) {
+        const Vec3 en = cross(n, e[k]);
+        const double e2 = length_squared(e[k]);
+        t.inverse_e2[k] = e2 > 0 ? static_cast<float>(1 / e2) : 0.f;
+        for (int c = 0; c < 3; ++c) {
+            t.e[k][c] = static_cast<float>(e[k][c]);
+            t.en[k][c] = static_cast<float>(en[c]);
+        }
+    }
+    for (int c = 0; c < 3; ++c) {
+        t.a[c] = p[0][c];
+        t.n[c] = static_cast<float>(n[c]);
+        // Rounded away from the face, so that a cell is never missed.
+        constexpr float kFar = std::numeric_limits<float>::infinity();
+        t.lo[c] = std::nextafter(static_cast<float>(std::min({p[0][c], p[1][c], p[2][c]})), -kFar) -
+                  half_width;
+        t.hi[c] = std::nextafter(static_cast<float>(std::max({p[0][c], p[1][c], p[2][c]})), kFar) +
+                  half_width;
+    }
+    return t;
+}
+
+/// Calls fn(i, j, k) for the cells of `size` voxels, numbered from `first` over n cells each way, that may
+/// hold a voxel within the half width of the face: its box, and the slab round its plane.
+template <class Fn>
+void each_cell(const LeafTriangle& t, int size, const Coord& first, const Coord& n, float half_width,
+               Fn&& fn) {
+    int lo[3], hi[3];
+    for (int c = 0; c < 3; ++c) {
+        const double from = std::floor(std::ceil(t.lo[c]) / size) - first[c];
+        const double to = std::floor(std::floor(t.hi[c]) / size) - first[c];
+        lo[c] = static_cast<int>(std::max(0.0, from));
+        hi[c] = static_cast<int>(std::min(n[c] - 1.0, to));
+    }
+    const double half = 0.5 * (size - 1);
+    const double reach =
+        half * (std::fabs(t.n[0]) + std::fabs(t.n[1]) + std::fabs(t.n[2])) + half_width + 1e-3;
+    const auto middle = [&](int c, int i) { return (first[c] + i) * static_cast<double>(size) + half - t.a[c]; };
+    for (int i = lo[0]; i <= hi[0]; ++i)
+        for (int j = lo[1]; j <= hi[1]; ++j)
+            for (int k = lo[2]; k <= hi[2]; ++k)
+                if (std::fabs(t.n[0] * middle(0, i) + t.n[1] * middle(1, j) +
+                              t.n[2] * middle(2, k)) <= reach)
+                    fn(i, j, k);
+}
+
+/// Everything about a mesh on a lattice that blocks share.
+struct LatticeMeshData {
+    const ClosedMesh& mesh;
+    float half_width;
+    std::vector<LeafTriangle> triangles;
+    CoordBBox box; ///< whole blocks
+    std::unique_ptr<Columns> columns;
+
+    /// Which shells hold a voxel that no face is near.
+    bool inside(const Coord& voxel) const {
+        bool in = false;
+        for (std::uint32_t s = 0; s < mesh.shells.size(); ++s) {
+            const Shell::Role role = mesh.shells[s].role;
+            if (role == Shell::Role::sheet || columns->winding(voxel, s) == 0)
+                continue;
+            if (role == Shell::Role::cavity)
+                return false;
+            in = true;
+        }
+        return in;
+    }
+};
+
+class MeshBlock final : public BlockSampler {
+public:
+    MeshBlock(const LatticeMeshData& data, const Coord& block, std::vector<std::uint32_t> faces)
+        : data_(data), block_(block), first_(kLeaves + 1, 0) {
+        const Coord first(block.x() / kLeaf, block.y() / kLeaf, block.z() / kLeaf);
+        const auto each = [&](auto&& fn) {
+            for (const std::uint32_t f : faces)
+                each_cell(data_.triangles[f], kLeaf, first, Coord(kAcross), data_.half_width,
+                          [&](int i, int j, int k) {
+                              fn(f, static_cast<std::size_t>((i * kAcross + j) * kAcross + k));
+                          });
+        };
+        each([&](std::uint32_t, std::size_t leaf) { ++first_[leaf + 1]; });
+        for (std::size_t i = 0; i < kLeaves; ++i)
+            first_[i + 1] += first_[i];
+        faces_.resize(first_[kLeaves]);
+        std::vector<std::uint32_t> next(first_.begin(), first_.end() - 1);
+        each([&](std::uint32_t f, std::size_t leaf) { faces_[next[leaf]++] = f; });
+    }
+
+    Cover cover(const Coord& leaf) const override {
+        const std::size_t i = index(leaf);
+        if (first_[i] != first_[i + 1])
+            return Cover::surface;
+        return data_.inside(leaf) ? Cover::inside : Cover::outside;
+    }
+
+    void values(const Coord& leaf, float* out) override {
+        const std::uint32_t* face = faces_.data() + first_[index(leaf)];
+        const std::uint32_t* last = faces_.data() + first_[index(leaf) + 1];
+        const float w = data_.half_width;
+        alignas(64) float solid[512], cavity[512], shell[512];
+        std::fill(solid, solid + 512, w);
+        std::fill(cavity, cavity + 512, w);
+        for (std::uint32_t s = 0; s < data_.mesh.shells.size(); ++s) {
+            const Shell::Role role = data_.mesh.shells[s].role;
+            if (role == Shell::Role::sheet)
+                continue;
+            const std::uint32_t* end = face; // lists are sorted by face, so by shell
+            while (end != last && data_.triangles[*end].shell == s)
+                ++end;
+            float* into = role == Shell::Role::solid ? solid : cavity;
+            if (end == face) { // no face near: all on one side
+                if (data_.columns->winding(leaf, s) != 0)
+                    std::fill(into, into + 512, -w);
+                continue;
+            }
+            shell_distance(leaf, s, face, end, shell);
+            for (int i = 0; i < 512; ++i)
+                into[i] = std::min(into[i], shell[i]);
+            face = end;
+        }
+        subtract_values(solid, cavity, out);
+    }
+
+private:
+    std::size_t index(const Coord& leaf) const {
+        return static_cast<std::size_t>(((leaf.x() - block_.x()) / kLeaf * kAcross +
+                                         (leaf.y() - block_.y()) / kLeaf) * kAcross +
+                                        (leaf.z() - block_.z()) / kLeaf);
+    }
+
+    void shell_distance(const Coord& leaf, std::uint32_t shell, const std::uint32_t* face,
+                        const std::uint32_t* end, float* out) const {
+        std::int8_t winding[512] = {};
+        for (int x = 0; x < kLeaf; ++x)
+            for (int y = 0; y < kLeaf; ++y) {
+                const int cx = leaf.x() + x, cy = leaf.y() + y;
+                std::int8_t* row = winding + x * 64 + y * 8;
+                for (auto hit = data_.columns->begin(cx, cy); hit != data_.columns->end(cx, cy); ++hit)
+                    for (int z = std::max(0, hit->z - leaf.z()); hit->shell == shell && z < kLeaf; ++z)
+                        row[z] = static_cast<std::int8_t>(
+                            std::clamp(row[z] + hit->sign, -100, 100));
+            }
+        const float w = data_.half_width;
+        std::fill(out, out + 512, w * w);
+        min_triangles(data_.triangles.data(), face, end, leaf.data(), w,
+                      data_.columns->overlaps_itself(shell) ? winding : nullptr, out);
+        for (int i = 0; i < 512; ++i) {
+            const float d = std::sqrt(out[i]);
+            out[i] = winding[i] != 0 ? -d : d;
+        }
+    }
+
+    const LatticeMeshData& data_;
+    Coord block_;
+    std::vector<std::uint32_t> first_, faces_; // faces of leaf i: faces_[first_[i] .. first_[i + 1])
+};
+
+class LatticeMesh final : public LatticeField {
+public:
+    LatticeMesh(const ClosedMesh& mesh, const Lattice& lattice)
+        : data_{mesh, lattice.half_width_vox, {}, {}, nullptr} {
+        std::vector<Vec3> points(mesh.positions.size());
+        for (std::size_t i = 0; i < points.size(); ++i)
+            points[i] = (mesh.positions[i] - lattice.origin) / lattice.voxel_m;
+        make_triangles(points);
+        data_.columns = std::make_unique<Columns>(mesh, points, data_.box);
+        list_blocks();
+    }
+
+    CoordBBox bounds() const override { return data_.box; }
+
+    std::unique_ptr<BlockSampler> open(const Coord& block, Cover& cover) const override {
+        if (data_.box.isInside(block)) {
+            const std::size_t b = block_index(block.x() >> 6, block.y() >> 6, block.z() >> 6);
+            if (first_[b] != first_[b + 1]) {
+                cover = Cover::surface;
+                return std::make_unique<MeshBlock>(
+                    data_, block,
+                    std::vector<std::uint32_t>(
+                        faces_.begin() + static_cast<std::ptrdiff_t>(first_[b]),
+                        faces_.begin() + static_cast<std::ptrdiff_t>(first_[b + 1])));
+            }
+            if (data_.inside(block)) {
+                cover = Cover::inside;
+                return nullptr;
+            }
+        }
+        cover = Cover::outside;
+        return nullptr;
+    }
+
+private:
+    void make_triangles(const std::vector<Vec3>& points) {
+        const ClosedMesh& mesh = data_.mesh;
+        Box box;
+        for (const Triangle& t : mesh.triangles)
+            for (const std::uint32_t v : t)
+                box.include(points[v]);
+        const double reach = data_.half_width + 2;
+        if (box.dilated(reach).lo.x < -0x1p30 || box.longest() > 0x1p22 ||
+            std::max({std::fabs(box.lo.x), std::fabs(box.lo.y), std::fabs(box.lo.z), box.hi.x, box.hi.y,
+                      box.hi.z}) > 0x1p29)
+            throw Error(Fault::bad_argument,
+                        "voxelize: the mesh would be more than 2^22 voxels long or 2^29 from the origin; "
+                        "use a larger voxel, or move it");
+        Coord lo, hi;
+        for (int axis = 0; axis < 3; ++axis) {
+            lo[axis] = static_cast<int>(std::floor(box.lo[axis] - reach)) & ~(kBlock - 1);
+            hi[axis] = static_cast<int>(std::ceil(box.hi[axis] + reach)) | (kBlock - 1);
+        }
+        data_.box = CoordBBox(lo, hi);
+        data_.triangles.resize(mesh.triangles.size());
+        tbb::parallel_for(
+            tbb::blocked_range<std::size_t>(0, mesh.triangles.size(), 256), [&](const auto& range) {
+                for (std::size_t i = range.begin(); i < range.end(); ++i) {
+                    const Triangle& t = mesh.triangles[i];
+                    data_.triangles[i] = leaf_triangle({points[t[0]], points[t[1]], points[t[2]]},
+                                                       mesh.shell_of[i], data_.half_width);
+                }
+            });
+    }
+
+    void list_blocks() {
+        lo_ = Coord(data_.box.min().x() >> 6, data_.box.min().y() >> 6, data_.box.min().z() >> 6);
+        n_ = Coord(data_.box.dim().x() >> 6, data_.box.dim().y() >> 6, data_.box.dim().z() >> 6);
+        const std::size_t n_blocks = static_cast<std::size_t>(n_.x()) *
+                                     static_cast<std::size_t>(n_.y()) * static_cast<std::size_t>(n_.z());
+        first_.assign(n_blocks + 1, 0);
+        const auto each = [&](auto&& fn) {
+            for (std::uint32_t f = 0; f < data_.triangles.size(); ++f)
+                each_cell(data_.triangles[f], kBlock, lo_, n_, data_.half_width,
+                          [&](int i, int j, int k) {
+                              fn(f, block_index(lo_.x() + i, lo_.y() + j, lo_.z() + k));
+                          });
+        };
+        each([&](std::uint32_t, std::size_t b) { ++first_[b + 1]; });
+        for (std::size_t b = 0; b < n_blocks; ++b)
+            first_[b + 1] += first_[b];
+        faces_.resize(first_[n_blocks]);
+        std::vector<std::size_t> next(first_.begin(), first_.end() - 1);
+        each([&](std::uint32_t f, std::size_t b) { faces_[next[b]++] = f; });
+    }
+
+    std::size_t block_index(int x, int y, int z) const {
+        return (static_cast<std::size_t>(x - lo_.x()) * static_cast<std::size_t>(n_.y()) +
+                static_cast<std::size_t>(y - lo_.y())) *
+                   static_cast<std::size_t>(n_.z()) +
+               static_cast<std::size_t>(z - lo_.z());
+    }
+
+    LatticeMeshData data_;
+    Coord lo_, n_; // first block and number of blocks
+    std::vector<std::size_t> first_; // faces of block b: faces_[first_[b] .. first_[b + 1])
+    std::vector<std::uint32_t> faces_;
+};
+
+} // namespace
+
+MeshField::MeshField(ClosedMesh mesh) : mesh_(std::move(mesh)) {}
+
+std::unique_ptr<LatticeField> MeshField::on(const Lattice& lattice) const {
+    return std::make_unique<LatticeMesh>(mesh_, lattice);
+}
+
+} // namespace taihu

@@ -1,0 +1,23 @@
+#pragma once
+#include <openvdb/openvdb.h>
+
+#include "stats/core/progress.h"
+#include "vdb_ops/field.h"
+
+namespace taihu {
+
+/// The narrow-band level set of a field [m]: active where |distance| is below the half width.
+/// Leaves that the surface does not come near are never evaluated. The same bits on any number of
+/// threads, and any block computed alone equals the same block of the whole.
+/// Time O(leaves near the surface), memory that of the result.
+/// \throws Error bad_argument: a lattice out of range, or voxel indices beyond 2^30;
+///   cancelled: within one block of 64^3 voxels.
+openvdb::FloatGrid::Ptr rasterize(const Field& field, const Lattice& lattice,
+                                  Progress* progress = nullptr);
+
+/// The lattice that `grid` lies on.
+/// \throws Error bad_argument, naming the grid: not a level set, voxels that are not cubes, a rotated
+///   or sheared transform, or a half width below 2 voxels.
+Lattice lattice_of(const openvdb::FloatGrid& grid);
+
+} // namespace taihu

@@ -1,0 +1,117 @@
+#include "vdb_ops/recipe.h"
+
+#include <nlohmann/json.hpp>
+
+#include "stats/core/error.h"
+
+namespace taihu {
+namespace {
+
+using Json = nlohmann::ordered_json; // keys stay as they were put in
+
+constexpr int kVersion = 1;
+
+Json parsed(const std::string& node) { return Json::parse(node); }
+
+std::string node(const char* kind, Json body) {
+    Json out;
+    out[kind] = std::move(body);
+    return out.dump();
+}
+
+Json lod_json(const RecipeLod& lod) {
+    return {{"levels", lod.n_levels}, {"bound_m", lod.bound_m}, {"factor", lod.factor}};
+}
+
+/// A recipe's text as JSON; null when it is not one.
+Json recipe_json(const std::string& recipe) {
+    Json json = Json::parse(recipe, nullptr, false);
+    if (!json.is_object() || !json.contains("taihu_recipe") || !json.contains("solid") ||
+        !json["solid"].is_object())
+        return nullptr;
+    return json;
+}
+
+} // namespace
+
+std::string shape_node(const ShapeSettings& s) {
+    Json body;
+    body["size_m"] = {s.size_m.x, s.size_m.y, s.size_m.z};
+    if (s.kind == ShapeKind::torus)
+        body["tube_m"] = s.tube_m;
+    if (s.kind == ShapeKind::icosphere || s.kind == ShapeKind::boulder)
+        body["subdivisions"] = s.subdivisions;
+    if (s.kind == ShapeKind::boulder) {
+        body["relief"] = s.relief;
+        body["lumps"] = s.lumps;
+        body["seed"] = s.seed;
+    }
+    return node(std::string(shape_name(s.kind)).c_str(), std::move(body));
+}
+
+std::string file_node(const std::string& kind, const std::string& name, const std::string& sha256,
+                      double unit_m) {
+    Json body = {{"file", name}, {"sha256", sha256}};
+    if (kind == "mesh")
+        body["unit_m"] = unit_m;
+    return node(kind.c_str(), std::move(body));
+}
+
+std::string holes_node(const std::string& name, const std::string& sha256) {
+    return node("holes", {{"file", name}, {"sha256", sha256}});
+}
+
+std::string holes_node(const std::string& name, const std::string& sha256,
+                       const Placement& placement) {
+    Json body = {{"law", name}, {"sha256", sha256}};
+    if (placement.count)
+        body["count"] = *placement.count;
+    if (placement.porosity)
+        body["porosity"] = *placement.porosity;
+    if (placement.density_m3)
+        body["density_m3"] = *placement.density_m3;
+    body["scale_m"] = placement.scale_m;
+    body["seed"] = placement.seed;
+    return node("holes", std::move(body));
+}
+
+std::string difference_node(const std::string& of, const std::string& minus) {
+    return node("difference", {{"of", {parsed(of), parsed(minus)}}});
+}
+
+std::string clean_node(const std::string& of, std::optional<std::size_t> n_pieces,
+                       bool fill_bubbles) {
+    Json body = {{"of", parsed(of)}};
+    if (n_pieces)
+        body["pieces"] = *n_pieces;
+    else
+        body["pieces"] = "all";
+    body["bubbles"] = fill_bubbles ? "fill" : "keep";
+    return node("clean", std::move(body));
+}
+
+std::string format_recipe(const std::string& solid, double voxel_m, std::uint64_t seed,
+                          const std::optional<RecipeLod>& lod) {
+    Json json = {{"taihu_recipe", kVersion}, {"seed", seed}, {"voxel_m", voxel_m}};
+    if (lod)
+        json["lod"] = lod_json(*lod);
+    json["solid"] = parsed(solid);
+    return json.dump();
+}
+
+std::optional<std::string> recipe_solid(const std::string& recipe) {
+    const Json json = recipe_json(recipe);
+    if (json.is_null())
+        return std::nullopt;
+    return json["solid"].dump();
+}
+
+std::string with_lod(const std::string& recipe, const RecipeLod& lod) {
+    Json json = recipe_json(recipe);
+    if (json.is_null())
+        throw Error(Fault::bad_input, "recipe: not a taihu recipe; make the solid again");
+    json["lod"] = lod_json(lod);
+    return json.dump();
+}
+
+} // namespace taihu

@@ -1,0 +1,43 @@
+#pragma once
+#include <cstdint>
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "vdb_ops/place.h"
+#include "vdb_ops/shapes.h"
+
+namespace taihu {
+
+/// Recipes say how a solid was made: JSON text, version 1, kept in every output. These functions write
+/// them from the inside out; each returns one node of the tree, `{"kind": {...}}`, as text. Keys come in
+/// a fixed order and numbers in their shortest form, so the same recipe is the same text.
+
+std::string shape_node(const ShapeSettings& shape);
+/// A file of a solid: its base name and hash. `kind` is "mesh" or "level_set"; `unit_m` of a mesh.
+std::string file_node(const std::string& kind, const std::string& name, const std::string& sha256,
+                      double unit_m = 1);
+/// Holes from a table.
+std::string holes_node(const std::string& name, const std::string& sha256);
+/// Holes from a law file.
+std::string holes_node(const std::string& name, const std::string& sha256, const Placement& placement);
+std::string difference_node(const std::string& of, const std::string& minus);
+/// \param n_pieces  absent: all.
+std::string clean_node(const std::string& of, std::optional<std::size_t> n_pieces, bool fill_bubbles);
+
+struct RecipeLod {
+    int n_levels = 1;
+    double bound_m = 0, factor = 2;
+};
+
+/// The whole recipe. \param voxel_m  of the lattice.
+std::string format_recipe(const std::string& solid, double voxel_m, std::uint64_t seed,
+                          const std::optional<RecipeLod>& lod = std::nullopt);
+
+/// The `solid` node of a recipe, to build on; nothing when `recipe` is not one.
+std::optional<std::string> recipe_solid(const std::string& recipe);
+/// `recipe` with its `lod` replaced. \throws Error bad_input when `recipe` is not one.
+std::string with_lod(const std::string& recipe, const RecipeLod& lod);
+
+} // namespace taihu

@@ -1,0 +1,125 @@
+#include "vdb_ops/vdb_file.h"
+
+#include <cmath>
+#include <cstdlib>
+#include <unistd.h>
+
+#include <openvdb/io/File.h>
+#include <tbb/parallel_for.h>
+
+#include "stats/core/error.h"
+#include "stats/core/file.h"
+#include "stats/core/sha256.h"
+#include "stats/core/text.h"
+#include "vdb_ops/rasterize.h"
+
+namespace taihu {
+namespace {
+
+constexpr const char* kRecipeKey = "taihu_recipe";
+constexpr char kMagic[] = {' ', 'B', 'D', 'V', 0, 0, 0, 0};
+// magic 8, file version 4, library version 8, offsets flag 1: then 36 characters of id.
+constexpr std::size_t kIdAt = 21, kIdSize = 36;
+
+void check_finite(const openvdb::FloatGrid& grid, const std::string& where) {
+    std::vector<const openvdb::FloatTree::LeafNodeType*> leaves;
+    grid.tree().getNodes(leaves);
+    std::vector<char> bad(leaves.size(), 0);
+    tbb::parallel_for(std::size_t{0}, leaves.size(), [&](std::size_t i) {
+        const float* v = leaves[i]->buffer().data();
+        for (int k = 0; k < 512; ++k)
+            bad[i] |= !std::isfinite(v[k]);
+    });
+    for (std::size_t i = 0; i < bad.size(); ++i)
+        if (bad[i])
+            throw Error(Fault::bad_input,
+                        where + ": a voxel near (" + std::to_string(leaves[i]->origin().x()) + ", " +
+                            std::to_string(leaves[i]->origin().y()) + ", " +
+                            std::to_string(leaves[i]->origin().z()) +
+                            ") is not finite; write the level set again");
+}
+
+/// A 8-4-4-4-12 id from the hash of everything else in the file.
+void replace_id(std::string& bytes, const std::string& where) {
+    if (bytes.size() < kIdAt + kIdSize)
+        throw Error(Fault::io, where + ": cannot write: the file came out short");
+    std::fill_n(bytes.begin() + kIdAt, kIdSize, '0');
+    const std::string hash = sha256_hex(bytes);
+    const std::string id = hash.substr(0, 8) + '-' + hash.substr(8, 4) + '-' + hash.substr(12, 4) +
+                           '-' + hash.substr(16, 4) + '-' + hash.substr(20, 12);
+    bytes.replace(kIdAt, kIdSize, id);
+}
+
+} // namespace
+
+VdbFile read_vdb(const std::filesystem::path& path) {
+    const std::string where = path.string();
+    openvdb::initialize();
+    {
+        const std::string bytes = read_file(path); // regular, readable, of a size that memory takes
+        if (bytes.size() < sizeof kMagic || bytes.compare(0, 4, kMagic, 4) != 0)
+            throw Error(Fault::bad_input, where + ": not an OpenVDB file; give a .vdb");
+    }
+    VdbFile result;
+    try {
+        openvdb::io::File file(path.string());
+        file.open(false); // no delayed loading: the file may change under us
+        const auto grids = file.readAllGridMetadata();
+        for (const auto& grid : *grids)
+            if (!result.solid && grid && grid->isType<openvdb::FloatGrid>() &&
+                grid->getGridClass() == openvdb::GRID_LEVEL_SET)
+                result.solid = openvdb::gridPtrCast<openvdb::FloatGrid>(file.readGrid(grid->getName()));
+        file.close();
+    } catch (const std::exception& e) {
+        throw Error(Fault::bad_input, where + ": cannot be read as OpenVDB (" +
+                                          printable(e.what(), 80) + "); write the file again");
+    }
+    if (!result.solid)
+        throw Error(Fault::bad_input,
+                    where + ": holds no float level set; convert a fog volume to a level set first");
+    try {
+        lattice_of(*result.solid);
+    } catch (const Error& e) {
+        throw Error(Fault::bad_input, where + ": " + e.what());
+    }
+    check_finite(*result.solid, where);
+    if (const auto recipe = result.solid->getMetadata<openvdb::StringMetadata>(kRecipeKey))
+        result.recipe = recipe->value();
+    return result;
+}
+
+void write_vdb(const std::filesystem::path& path, const openvdb::FloatGrid& solid,
+               const std::string& recipe) {
+    const auto folder = path.has_parent_path() ? path.parent_path() : std::filesystem::path(".");
+    auto grid = openvdb::FloatGrid::create(std::const_pointer_cast<openvdb::FloatTree>(
+        std::static_pointer_cast<const openvdb::FloatTree>(solid.constTreePtr()))); // shares the tree
+    grid->setTransform(solid.transform().copy());
+    grid->setGridClass(openvdb::GRID_LEVEL_SET);
+    grid->setName("surface");
+    if (!recipe.empty())
+        grid->insertMeta(kRecipeKey, openvdb::StringMetadata(recipe));
+    openvdb::initialize();
+    // OpenVDB seeks while it writes, so it needs a file of its own first.
+    std::string temporary = (folder / ".taihu-tmp-XXXXXX").string();
+    const int made = ::mkstemp(temporary.data());
+    if (made < 0)
+        throw Error(Fault::io, path.string() + ": cannot write there; check the folder");
+    ::close(made);
+    std::string bytes;
+    try {
+        openvdb::io::File file(temporary);
+        file.setCompression(openvdb::io::COMPRESS_BLOSC | openvdb::io::COMPRESS_ACTIVE_MASK);
+        openvdb::GridCPtrVec grids{grid};
+        file.write(grids);
+        file.close();
+        bytes = read_file(temporary);
+    } catch (const std::exception& e) {
+        ::unlink(temporary.c_str());
+        throw Error(Fault::io, path.string() + ": cannot write (" + printable(e.what(), 80) + ")");
+    }
+    ::unlink(temporary.c_str());
+    replace_id(bytes, path.string());
+    write_file(path, bytes);
+}
+
+} // namespace taihu

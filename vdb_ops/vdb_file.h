@@ -1,0 +1,25 @@
+#pragma once
+#include <filesystem>
+#include <string>
+
+#include <openvdb/openvdb.h>
+
+namespace taihu {
+
+struct VdbFile {
+    openvdb::FloatGrid::Ptr solid;
+    std::string recipe; ///< JSON text of what made it, or empty
+};
+
+/// The first level set of a .vdb file.
+/// \throws Error bad_input: not a .vdb, damaged, no float level set in it, a non-finite voxel, or as
+///   lattice_of(); io. OpenVDB's own messages are cut to one line.
+VdbFile read_vdb(const std::filesystem::path& path);
+
+/// Write `solid` (named "surface") with `recipe` as the metadata taihu_recipe. The random id that
+/// OpenVDB writes into each file is replaced by one from the content: the same solid gives the same
+/// bytes. In one step, as write_file(). \throws Error io.
+void write_vdb(const std::filesystem::path& path, const openvdb::FloatGrid& solid,
+               const std::string& recipe);
+
+} // namespace taihu

@@ -1,0 +1,40 @@
+#pragma once
+#include <string>
+
+#include <openvdb/openvdb.h>
+
+#include "stats/core/progress.h"
+#include "stats/core/tri_mesh.h"
+#include "vdb_ops/closed_mesh.h"
+
+namespace taihu {
+
+struct VoxelizeSettings {
+    double voxel_m = 0;            ///< > 0
+    float half_width_vox = 3;      ///< 2..16
+    CloseRule close = CloseRule::loops;
+};
+
+struct VoxelizeResult {
+    openvdb::FloatGrid::Ptr solid; ///< narrow-band level set [m], negative inside
+    MeshDiagnosis diagnosis;       ///< what was found and closed
+};
+
+/// Any triangle mesh as a level set: exact distances, signs by integer winding numbers.
+/// \param where  stands for the mesh in messages.
+/// \throws Error as close_mesh(), rasterize() and refuse_if_too_large().
+VoxelizeResult voxelize(const TriMesh& mesh, const std::string& where,
+                        const VoxelizeSettings& settings, Progress* progress = nullptr);
+
+/// Voxel size that puts `dim` voxels along the longest axis of `box` [m].
+/// \throws Error bad_argument: dim outside 4..65536, or an empty box.
+double voxel_for(const Box& box, int dim);
+
+/// Refuse what cannot fit before any work: a level set of `area_m2` at `voxel_m`, and what is made of it.
+/// \throws Error unsupported: `refused: ...`, with what it would need and the voxel size that fits.
+void refuse_if_too_large(double area_m2, const Box& box, double voxel_m);
+
+/// Bytes that a level set of `area_m2` needs at its peak, roughly (within a factor of two above 100 MB).
+double estimated_bytes(double area_m2, double voxel_m);
+
+} // namespace taihu
