@@ -1,8 +1,11 @@
 #include "mesh_out/extract.h"
 
 #include <algorithm>
+#include <cmath>
 #include <cstdint>
-#include <utility>
+#include <string>
+#include <tuple>
+#include <vector>
 
 #include <openvdb/tools/Interpolation.h>
 #include <openvdb/tools/VolumeToMesh.h>

@@ -142,9 +142,9 @@ LodChain Chain::make() {
         if (j > 0 && (!made || level.certificate.n_triangles >=
                                    chain.levels.back().certificate.n_triangles)) {
             chain.note = std::to_string(j) + " of " + std::to_string(settings_.n_levels) +
-                         " levels: a bound of " + shown(bound_m(j)) +
-                         " m allows no fewer triangles than level " + std::to_string(j - 1) +
-                         " has";
+                         " levels: within " + shown(bound_m(j)) +
+                         " m no mesh with fewer triangles than level " + std::to_string(j - 1) +
+                         " was found";
             break;
         }
         if (j > 0)

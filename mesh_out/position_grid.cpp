@@ -1,12 +1,14 @@
 #include "mesh_out/position_grid.h"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <cstdint>
+#include <cstdio>
 #include <deque>
 #include <string>
 #include <unordered_map>
+#include <utility>
+#include <vector>
 
 #include "mesh_out/half_edges_detail.h"
 
@@ -23,7 +25,9 @@ std::string shown(double value) {
 }
 
 double power_of_two_below(double x) {
-    return std::exp2(std::floor(std::log2(x)));
+    int exponent = 0;
+    std::frexp(x, &exponent); // x = m 2^exponent with 0.5 <= m < 1
+    return std::ldexp(1.0, exponent - 1);
 }
 
 bool is_power_of_two(double x) {
@@ -69,7 +73,7 @@ PositionGrid position_grid(const Box& box, double max_move_m, double origin_step
     if (grid.bits > 0)
         return grid;
     double fits = step;
-    while (grid_of_step(box, fits, std::max(fits, origin_step)).bits == 0)
+    while (std::isfinite(fits) && grid_of_step(box, fits, std::max(fits, origin_step)).bits == 0)
         fits *= 2;
     throw Error(Fault::numeric, "position grid: steps of " + shown(step) + " m need more than " +
                                     std::to_string(kMaxBits) +
@@ -150,6 +154,8 @@ Snapper::Snapper(const TriMesh& mesh, const PositionGrid& grid)
                                              ", must be 1..18 and a power of two");
     const double last = std::exp2(grid.bits) - 1;
     for (const Vertex v : mesh_.vertices()) {
+        if (mesh_.is_isolated(v))
+            continue;
         Point p = lattice(v.idx());
         for (std::size_t k = 0; k < 3; ++k) {
             p[k] = std::nearbyint(p[k]);

@@ -391,6 +391,8 @@ Image render_sheet(std::span<const TriMesh> levels, const RenderSettings& settin
     check(settings);
     require(!levels.empty() && levels.size() <= kMaxLevels, "the number of levels",
             static_cast<double>(levels.size()), "1..64");
+    const double n_pixels = static_cast<double>(levels.size()) * settings.width * settings.height;
+    require(n_pixels <= 0x1p28, "the number of pixels", n_pixels, "at most 2^28");
     const Placement place = placement(checked_bounds(levels), settings.turntable_deg);
     const View view = framed(levels, place, settings);
     RenderSettings wired = settings;

@@ -22,19 +22,21 @@ struct RenderSettings {
     std::uint64_t seed = 0;
 };
 
-/// A picture of the mesh, 3 channels, linear light: one warm key light 55 degrees to the left and 42
-/// up, soft as the sun, and a sky with ambient occlusion (key : sky about 1.9 : 0.9), ground bounce;
-/// perspective from 3.2 times the mesh's height (of its largest extent if that is more), aimed at
-/// the middle of its box; the whole mesh is in the frame at every turntable angle, with 6 % to spare.
-/// Behind it a bright gradient that depends on the row alone.
-/// Same bytes on any number of threads. Rays by Embree 3, in time O(pixels * samples * ao_rays).
-/// \throws Error bad_argument: a setting out of range, a mesh that is empty, has no extent, or has
+/// A picture of the mesh, 3 channels, linear light: one warm key light 55 degrees to the left and
+/// 42 up, soft as the sun, and a sky with ambient occlusion (key : sky about 1.9 : 0.9), ground
+/// bounce; perspective from 3.2 times the mesh's height (of its largest extent if that is more),
+/// aimed at the middle of its box; the whole mesh is in the frame at every turntable angle, with 6
+/// % to spare. Behind it a bright gradient that depends on the row alone. Same bytes on any number
+/// of threads. Rays by Embree 3, in time O(pixels * samples * ao_rays). \throws Error bad_argument:
+/// a setting out of range, a mesh that is empty, has no extent, or has
 ///               a bad index or position; cancelled.
-Image render(const TriMesh& mesh, const RenderSettings& settings = {}, Progress* progress = nullptr);
+Image render(const TriMesh& mesh, const RenderSettings& settings = {},
+             Progress* progress = nullptr);
 
 /// All `levels` side by side from one camera (so that sizes compare), each with its wireframe as an
 /// inset in the lower right corner of its panel, enlarged at one place until the triangles of the
-/// first level show; settings are those of one panel. At most 64 levels. \throws as render().
+/// first level show; settings are those of one panel. At most 64 levels and 2^28 pixels.
+/// \throws as render().
 Image render_sheet(std::span<const TriMesh> levels, const RenderSettings& settings = {},
                    Progress* progress = nullptr);
 

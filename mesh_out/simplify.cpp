@@ -3,9 +3,11 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <limits>
 #include <numbers>
 #include <queue>
 #include <string>
+#include <tuple>
 
 #include <OpenMesh/Core/Utils/vector_cast.hh> // QuadricT.hh needs it and does not include it
 
@@ -51,8 +53,8 @@ struct Surface {
     std::vector<std::uint8_t> inner;     ///< per vertex: its ring lies in its block
     std::vector<std::uint8_t> exhausted; ///< per vertex: no collapse of it is legal as things are
 
-    // Reference vertices that the surface has lost, in one list per face: each lies within the
-    // bound of its face. Point i < number of vertices is vertex i.
+    // What of the reference the surface no longer passes through, in one list per face: each point
+    // stays within the bound of its face. Point i < number of vertices is vertex i.
     std::vector<Vec3> points;
     std::vector<std::uint32_t> first_point; ///< per face, kNone at the end
     std::vector<std::uint32_t> next_point;  ///< per point
@@ -322,7 +324,8 @@ bool Worker::within(const Vec3& a, const Vec3& b, const Vec3& c, const Vec3& mid
     const Vec3 ab = (a + b) * 0.5, bc = (b + c) * 0.5, ca = (c + a) * 0.5;
     const auto corner = [&](const Vec3& p, const Vec3& q, const Vec3& r) {
         const Vec3 m = (p + q + r) / 3;
-        return within(p, q, r, m, s_.reference(m, s_.bound_m));
+        const double reach = std::min(s_.bound_m, (d + length(m - middle)) * (1 + 1e-9));
+        return within(p, q, r, m, s_.reference(m, reach));
     };
     return within(ab, bc, ca, middle, d) && corner(a, ab, ca) && corner(ab, b, bc) &&
            corner(ca, bc, c);
@@ -430,18 +433,23 @@ TriMesh simplify(const TriMesh& mesh, const TriMesh& reference, const SimplifySe
     check_cancelled(progress);
     Surface surface(mesh, reference, settings);
     const double block_m = 32 * spacing_of(mesh);
+    if (!(block_m > 0) || !std::isfinite(block_m))
+        throw Error(Fault::bad_argument, "simplify: the mesh of " +
+                                             std::to_string(mesh.triangles.size()) +
+                                             " triangles has no finite area; repair it first");
     std::size_t n_triangles = mesh.triangles.size();
     const auto n_removable = [&] {
         return n_triangles - std::min(n_triangles, settings.min_triangles);
     };
     // Blocks at three places, then the whole as one block for what lay across all of their borders.
     constexpr std::array kShifts{0.0, 3.0 / 7, 5.0 / 7};
-    for (const double shift : kShifts) {
-        surface.divide(block_m, shift);
+    for (std::size_t pass = 0; pass <= kShifts.size(); ++pass) {
+        const bool last = pass == kShifts.size();
+        surface.divide(last ? std::numeric_limits<double>::infinity() : block_m,
+                       last ? 0.5 : kShifts[pass]);
         n_triangles -= run_blocks(surface, n_removable(), progress);
+        report_fraction(progress, static_cast<double>(pass + 1) / (kShifts.size() + 1));
     }
-    surface.divide(std::numeric_limits<double>::infinity(), 0.5);
-    run_blocks(surface, n_removable(), progress);
     return from_half_edges(surface.mesh, mesh);
 }
 

@@ -2,8 +2,10 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <limits>
 #include <string>
+#include <vector>
 
 #include <embree3/rtcore.h>
 #include <tbb/parallel_for.h>
@@ -22,6 +24,23 @@ struct SurfaceDistance::Scene {
     /// Corners, relative: what distances are computed from. Side by side, since memory is what a
     /// search waits for.
     std::vector<std::array<Vec3, 3>> corners;
+    /// A ball round each triangle: most of those that Embree offers are told to be too far by it.
+    struct Ball {
+        float x, y, z, radius;
+    };
+    std::vector<Ball> balls;
+
+    static Ball ball_round(const std::array<Vec3, 3>& corners) {
+        const Vec3 middle = (corners[0] + corners[1] + corners[2]) / 3;
+        Ball ball{static_cast<float>(middle.x), static_cast<float>(middle.y),
+                  static_cast<float>(middle.z), 0};
+        double radius = 0;
+        for (const Vec3& corner : corners)
+            radius = std::max(radius, length(corner - Vec3{ball.x, ball.y, ball.z}));
+        ball.radius = std::nextafter(static_cast<float>(radius * (1 + 1e-12)),
+                                     std::numeric_limits<float>::infinity());
+        return ball;
+    }
 
     ~Scene() {
         if (scene)
@@ -33,7 +52,7 @@ struct SurfaceDistance::Scene {
     struct Search {
         const Scene* scene;
         Vec3 point; ///< relative
-        double best_squared;
+        double best, best_squared;
         double slack; ///< more than float rounds off, so that no triangle is culled wrongly
         std::uint32_t triangle;
         Vec3 nearest;
@@ -46,6 +65,10 @@ struct SurfaceDistance::Scene {
 
     static bool visit(RTCPointQueryFunctionArguments* args) {
         Search& search = *static_cast<Search*>(args->userPtr);
+        const Ball& ball = search.scene->balls[args->primID];
+        const double reach = (search.best + ball.radius) * (1 + 1e-12); // more than double rounds
+        if (length_squared(search.point - Vec3{ball.x, ball.y, ball.z}) > reach * reach)
+            return false;
         const auto& [a, b, c] = search.scene->corners[args->primID];
         const Vec3 q = closest_point_on_triangle(search.point, a, b, c);
         const double squared = length_squared(q - search.point);
@@ -53,10 +76,11 @@ struct SurfaceDistance::Scene {
         if (squared > search.best_squared ||
             (squared == search.best_squared && args->primID >= search.triangle))
             return false;
+        search.best = std::sqrt(squared);
         search.best_squared = squared;
         search.triangle = args->primID;
         search.nearest = q;
-        const float radius = search_radius(std::sqrt(squared), search.slack);
+        const float radius = search_radius(search.best, search.slack);
         if (radius >= args->query->radius)
             return false;
         args->query->radius = radius;
@@ -64,7 +88,8 @@ struct SurfaceDistance::Scene {
     }
 
     Search search(const Vec3& point, double at_most) const {
-        Search result{this, point - center, at_most * at_most, 0, RTC_INVALID_GEOMETRY_ID, {}};
+        Search result{this, point - center,          at_most, at_most * at_most,
+                      0,    RTC_INVALID_GEOMETRY_ID, {}};
         const Vec3& p = result.point;
         result.slack = 1e-6 * (extent + std::max({std::abs(p.x), std::abs(p.y), std::abs(p.z)}));
         RTCPointQuery query;
@@ -95,9 +120,12 @@ SurfaceDistance::SurfaceDistance(const TriMesh& mesh) : scene_(std::make_unique<
     s.center = box.center();
     s.extent = box.longest();
     s.corners.reserve(mesh.triangles.size());
-    for (const Triangle& t : mesh.triangles)
+    s.balls.reserve(mesh.triangles.size());
+    for (const Triangle& t : mesh.triangles) {
         s.corners.push_back({mesh.positions[t[0]] - s.center, mesh.positions[t[1]] - s.center,
                              mesh.positions[t[2]] - s.center});
+        s.balls.push_back(Scene::ball_round(s.corners.back()));
+    }
 
     s.device = rtcNewDevice("verbose=0");
     s.scene = rtcNewScene(s.device);
@@ -132,9 +160,7 @@ SurfaceDistance::~SurfaceDistance() = default;
 
 double SurfaceDistance::operator()(const Vec3& point, double at_most) const {
     const Scene::Search found = scene_->search(point, at_most);
-    return found.triangle == RTC_INVALID_GEOMETRY_ID
-               ? at_most
-               : std::min(at_most, std::sqrt(found.best_squared));
+    return found.triangle == RTC_INVALID_GEOMETRY_ID ? at_most : std::min(at_most, found.best);
 }
 
 Vec3 SurfaceDistance::nearest(const Vec3& point) const {

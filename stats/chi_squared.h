@@ -21,12 +21,13 @@ struct ChiSquaredTest {
     std::vector<double> observed, expected; ///< profiles in each cell
 };
 
-/// Pearson's test of the profiles themselves against the sections of `law` above the detection limit.
+/// Pearson's test of the profiles themselves against the sections of `law` above the detection
+/// limit.
 ///
-/// Binned profiles keep their bins from the detection limit to the end of the last one, what the law
-/// expects past it being no cell; bins are joined upwards until each cell expects 5 or more, and the
-/// rest joins the last. Diameters are counted in cells of equal expectation, n / 5 of them but at
-/// most 10, the last one open.
+/// Binned profiles keep their bins from the detection limit to the end of the last one, what the
+/// law expects past it being no cell; bins are joined upwards until each cell expects 5 or more,
+/// and the rest joins the last. Diameters are counted in cells of equal expectation, n / 5 of them
+/// but at most 10, the last one open.
 ///
 /// \param n_fitted  how many parameters of the law were fitted to this sample.
 /// \throws Error bad_input: too few profiles for one degree of freedom; as check_sample.

@@ -1,9 +1,12 @@
 #include <algorithm>
+#include <array>
+#include <charconv>
 #include <cmath>
+#include <memory>
 #include <new>
-#include <numeric>
+#include <optional>
+#include <stdexcept>
 
-#include <draco/attributes/attribute_quantization_transform.h>
 #include <draco/compression/decode.h>
 #include <draco/compression/expert_encode.h>
 #include <draco/compression/point_cloud/point_cloud_decoder.h>
@@ -28,7 +31,8 @@ constexpr std::uint64_t kFreeFaces = std::uint64_t{1} << 22, kFacesPerByte = 64;
     throw Error(Fault::bad_input, where + ": " + what + "; copy or export the file again");
 }
 
-void check_on_grid(const TriMesh& mesh, const PositionGrid& grid) {
+/// The exponent of the grid's step.
+int check_on_grid(const TriMesh& mesh, const PositionGrid& grid) {
     int exponent = 0;
     if (!(grid.step_m > 0) || std::frexp(grid.step_m, &exponent) != 0.5 || grid.bits < 1 ||
         grid.bits > 18)
@@ -37,16 +41,48 @@ void check_on_grid(const TriMesh& mesh, const PositionGrid& grid) {
                         std::to_string(grid.step_m) +
                         " m; give 1 to 18 bits and a step that is a power of two");
     const double last = std::ldexp(1.0, grid.bits) - 1;
+    const auto fits_float = [](double v) {
+        return static_cast<double>(static_cast<float>(v)) == v;
+    };
+    for (int axis = 0; axis < 3; ++axis) {
+        const double k = grid.origin[axis] / grid.step_m;
+        if (!fits_float(grid.origin[axis]) || k != std::floor(k) || !(std::abs(k) < 0x1p53))
+            throw Error(Fault::bad_argument, "encode_draco: the grid's origin is no float multiple "
+                                             "of its step; make it by position_grid()");
+    }
     for (std::size_t i = 0; i < mesh.positions.size(); ++i)
         for (int axis = 0; axis < 3; ++axis) {
-            const double p = mesh.positions[i][axis], origin = grid.origin[axis];
-            const double q = (p - origin) / grid.step_m; // exact: the step is a power of two
-            if (!(q >= 0 && q <= last) || q != std::floor(q) || origin + q * grid.step_m != p ||
-                static_cast<double>(static_cast<float>(p)) != p ||
-                static_cast<double>(static_cast<float>(origin)) != origin)
+            const double p = mesh.positions[i][axis];
+            const double q = (p - grid.origin[axis]) / grid.step_m; // exact: a power of two
+            if (!(q >= 0 && q <= last) || q != std::floor(q) ||
+                grid.origin[axis] + q * grid.step_m != p || !fits_float(p))
                 throw Error(Fault::bad_argument, "encode_draco: positions[" + std::to_string(i) +
                                                      "] is not on the grid; snap the mesh to it");
         }
+    return exponent - 1;
+}
+
+/// k * 2^exponent for strtof: exact, and without a decimal point, which locales differ in.
+std::string hex_float(double k, int exponent) {
+    char digits[32];
+    const auto end =
+        std::to_chars(digits, digits + sizeof digits, static_cast<std::int64_t>(std::abs(k)), 16)
+            .ptr;
+    return (k < 0 ? "-0x" : "0x") + std::string(digits, end) + 'p' + std::to_string(exponent);
+}
+
+/// What SetAttributeExplicitQuantization() sets, without its loss: Draco keeps options as text, and
+/// that function writes them with six decimals, so that steps below 2^-6 m would come out wrong.
+/// Its step is range / (2^bits - 1) in float, here exactly that of the grid.
+draco::Options quantization(const PositionGrid& grid, int exponent) {
+    std::string origin;
+    for (int axis = 0; axis < 3; ++axis)
+        origin += hex_float(grid.origin[axis] / grid.step_m, exponent) + ' ';
+    draco::Options options;
+    options.SetInt("quantization_bits", grid.bits);
+    options.SetString("quantization_origin", origin);
+    options.SetString("quantization_range", hex_float(std::ldexp(1.0, grid.bits) - 1, exponent));
+    return options;
 }
 
 int add_vectors(draco::Mesh& mesh, draco::GeometryAttribute::Type type,
@@ -127,30 +163,14 @@ void check_claims(draco::DecoderBuffer buffer, const std::string& where) {
     }
 }
 
-/// The vectors of `attribute`, one per point. Positions come quantised and are scaled here, in IEEE
-/// arithmetic as other decoders do it: the packaged libdraco is built with -ffast-math and its step
-/// is off in the last place (measured), which would move every position.
 std::vector<Vec3> vectors_of(const draco::Mesh& mesh, const draco::PointAttribute& attribute,
                              const std::string& where) {
-    draco::AttributeQuantizationTransform transform;
-    const auto* data = attribute.GetAttributeTransformData();
-    const bool quantised = data &&
-                           data->transform_type() == draco::ATTRIBUTE_QUANTIZATION_TRANSFORM &&
-                           transform.InitFromAttribute(attribute);
-    float step = 0;
-    if (quantised) {
-        if (transform.quantization_bits() < 1 || transform.quantization_bits() > 30)
-            fail(where, "the Draco stream has a broken quantisation");
-        step = transform.range() / static_cast<float>((1 << transform.quantization_bits()) - 1);
-    }
     std::vector<Vec3> out(mesh.num_points());
     for (std::uint32_t i = 0; i < mesh.num_points(); ++i) {
         float v[3] = {};
         const auto index = attribute.mapped_index(draco::PointIndex(i));
         if (index.value() >= attribute.size() || !attribute.ConvertValue<float, 3>(index, v))
             fail(where, "the Draco stream has a broken attribute");
-        for (int axis = 0; quantised && axis < 3; ++axis)
-            v[axis] = v[axis] * step + transform.min_value(axis);
         out[i] = {v[0], v[1], v[2]};
         if (!is_finite(out[i]))
             fail(where, "Draco point " + std::to_string(i) + " is not finite");
@@ -164,7 +184,6 @@ std::unique_ptr<draco::Mesh> decode(std::string_view bytes, const std::string& w
     try {
         check_claims(buffer, where);
         draco::Decoder decoder;
-        decoder.SetSkipAttributeTransform(draco::GeometryAttribute::POSITION);
         auto result = decoder.DecodeMeshFromBuffer(&buffer);
         if (!result.ok())
             fail(where, "Draco says '" + printable(result.status().error_msg(), 80) + "'");
@@ -214,26 +233,19 @@ TriMesh decode_draco(std::string_view bytes, const std::string& where) {
 
 EncodedLevel encode_draco(const TriMesh& mesh, const PositionGrid& grid) {
     check_writable(mesh, "encode_draco");
-    check_on_grid(mesh, grid);
+    const int exponent = check_on_grid(mesh, grid);
     const auto source = to_draco(mesh);
     draco::ExpertEncoder encoder(*source);
     encoder.SetEncodingMethod(draco::MESH_EDGEBREAKER_ENCODING);
     encoder.SetSpeedOptions(kSpeed, kSpeed);
     encoder.SetTrackEncodedProperties(true);
-    const float origin[3] = {static_cast<float>(grid.origin.x), static_cast<float>(grid.origin.y),
-                             static_cast<float>(grid.origin.z)};
-    // Draco's step is range / (2^bits - 1) in float; so it is grid.step_m without rounding.
-    const auto n_steps = static_cast<float>((1 << grid.bits) - 1);
-    const auto range = static_cast<float>(grid.step_m) * n_steps;
-    encoder.SetAttributeExplicitQuantization(kDracoPositionId, grid.bits, 3, origin, range);
+    encoder.options().SetAttributeOptions(kDracoPositionId, quantization(grid, exponent));
     if (!mesh.normals.empty())
         encoder.SetAttributeQuantization(kDracoNormalId, kNormalBits);
     const auto give_up = [](const std::string& what) {
         throw Error(Fault::numeric, "encode_draco: " + what +
                                         "; give a closed 2-manifold whose vertices are all used");
     };
-    if (!(range / n_steps == static_cast<float>(grid.step_m)))
-        give_up("the grid's step does not fit Draco's arithmetic");
     draco::EncoderBuffer buffer;
     if (const draco::Status status = encoder.EncodeToBuffer(&buffer); !status.ok())
         give_up("Draco says '" + printable(status.error_msg(), 80) + "'");

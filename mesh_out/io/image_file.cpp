@@ -22,6 +22,7 @@ namespace taihu {
 namespace {
 
 constexpr std::size_t kMaxPixels = std::size_t{1} << 28;
+constexpr double kSrgbGamma = 0.45455; // what gAMA says of a file whose curve is that of sRGB
 constexpr std::size_t kMaxDeflateRatio = 1032; // no deflate stream unpacks to more
 
 // The curve of IEC 61966-2-1, from 0..1 to 0..1 either way.
@@ -201,6 +202,7 @@ std::string exr_bytes(const std::filesystem::path& path, const Image& image,
 struct PngShape {
     std::size_t width = 0, height = 0;
     std::size_t stored_row_bits = 0;
+    double exponent = 0; ///< from stored to linear values; 0 is the curve of sRGB
     // Once palette, small grey depths and transparency are expanded:
     std::size_t channels = 0, bytes_per_sample = 0, row_bytes = 0;
 };
@@ -215,6 +217,9 @@ bool read_header(PngReader& r, PngShape& shape) {
     shape.height = png_get_image_height(r.png, r.info);
     shape.stored_row_bits =
         shape.width * png_get_bit_depth(r.png, r.info) * png_get_channels(r.png, r.info);
+    double gamma = 0;
+    if (png_get_gAMA(r.png, r.info, &gamma) && std::abs(gamma - kSrgbGamma) > 0.01)
+        shape.exponent = 1 / gamma;
     return true;
 }
 
@@ -246,7 +251,8 @@ Image linear_image(const PngShape& shape, const std::vector<png_byte>& samples) 
     std::vector<float> curve(n_levels), straight(n_levels);
     for (std::size_t i = 0; i < n_levels; ++i) {
         const double value = static_cast<double>(i) / static_cast<double>(n_levels - 1);
-        curve[i] = static_cast<float>(decoded(value));
+        curve[i] = static_cast<float>(shape.exponent > 0 ? std::pow(value, shape.exponent)
+                                                         : decoded(value));
         straight[i] = static_cast<float>(value);
     }
     for (std::size_t i = 0; i < image.pixels.size(); ++i) {

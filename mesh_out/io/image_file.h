@@ -10,14 +10,15 @@
 namespace taihu {
 
 /// Write 1, 3 or 4 channels as an 8-bit PNG (linear light becomes sRGB; alpha stays) or as a
-/// scanline EXR (32-bit float, ZIP compression, channels Y or R, G, B, A; `attributes` as strings).
-/// The extension decides. In one step, like write_file(). The same image gives the same bytes.
-/// \throws Error unsupported: another extension; bad_argument: an empty image, another channel
-/// count.
+/// scanline EXR (32-bit float, ZIP compression, channels Y or R, G, B, A); `attributes` become its
+/// text chunks or string attributes. The extension decides. In one step, like write_file(). The
+/// same image gives the same bytes. \throws Error unsupported: another extension; bad_argument: an
+/// empty image, another channel count.
 void write_image(const std::filesystem::path& path, const Image& image,
                  const std::vector<std::pair<std::string, std::string>>& attributes = {});
 
-/// An 8- or 16-bit PNG as linear light with its own channel count (palette and grey expanded).
+/// A PNG as linear light with its own channel count (palette and grey below 8 bits expanded); its
+/// curve is sRGB's unless its gAMA chunk says something else.
 /// \throws Error bad_input, io; bad_input above 2^28 pixels.
 Image read_png(const std::filesystem::path& path);
 

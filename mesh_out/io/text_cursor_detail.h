@@ -6,8 +6,6 @@
 #include <string>
 #include <string_view>
 
-#include "mesh_out/io/mesh_formats_detail.h"
-#include "stats/core/error.h"
 #include "stats/core/progress.h"
 #include "stats/core/text.h"
 
@@ -24,22 +22,13 @@ struct TextSyntax {
 class TextCursor {
 public:
     TextCursor(std::string_view text, const std::string& where, TextSyntax syntax,
-               Progress* progress)
-        : text_(text), where_(&where), syntax_(syntax), progress_(progress) {
-        if (text_.starts_with("\xEF\xBB\xBF"))
-            at_ = 3;
-        if (text_.starts_with("\xFF\xFE") || text_.starts_with("\xFE\xFF"))
-            fail("the text is UTF-16", "save it as UTF-8");
-    }
+               Progress* progress);
 
     std::size_t bytes_left() const { return text_.size() - at_; }
     std::string_view left() const { return text_.substr(at_); }
     const std::string& recipe() const { return recipe_; }
 
-    [[noreturn]] void fail(const std::string& what, const std::string& remedy) const {
-        throw Error(Fault::bad_input,
-                    *where_ + ":" + std::to_string(line_) + ": " + what + "; " + remedy);
-    }
+    [[noreturn]] void fail(const std::string& what, const std::string& remedy) const;
 
     /// The next word of this line; empty at its end.
     std::string_view word() {
@@ -63,14 +52,7 @@ public:
     }
 
     /// The rest of this line as it stands, without the line's end.
-    std::string_view rest_of_line() {
-        const auto end = std::min(text_.find('\n', at_), text_.size());
-        auto rest = text_.substr(at_, end - at_);
-        at_ = end;
-        if (rest.ends_with('\r'))
-            rest.remove_suffix(1);
-        return rest;
-    }
+    std::string_view rest_of_line();
 
     /// To the start of the next line; false when this one was the last.
     bool next_line() {
@@ -115,28 +97,13 @@ public:
     }
 
     /// A whole number from this line.
-    std::int64_t integer(const char* what) {
-        const std::string_view text = word();
-        const auto parsed = parse_integer(text);
-        if (!parsed)
-            fail_word(what, text, "not a whole number");
-        return *parsed;
-    }
+    std::int64_t integer(const char* what);
 
     /// Says that the word `text`, which stands for `what`, is wrong; an empty one is missing.
-    [[noreturn]] void fail_word(const char* what, std::string_view text, const char* why) const {
-        if (text.empty())
-            fail(printable(what) + " is missing", "the file is cut short or damaged");
-        fail(printable(what) + " is '" + printable(text) + "', " + why,
-             "mend the file or export it again");
-    }
+    [[noreturn]] void fail_word(const char* what, std::string_view text, const char* why) const;
 
     /// Refuses anything more on this line.
-    void end_line() {
-        if (const std::string_view extra = word(); !extra.empty())
-            fail("'" + printable(extra) + "' is too much on this line",
-                 "mend the file or export it again");
-    }
+    void end_line();
 
 private:
     /// Is the character at `at` the end of a word? A carriage return counts as a blank.
@@ -162,10 +129,11 @@ private:
             }
         }
         if (syntax_.hash_comments && at_ < text_.size() && text_[at_] == '#') {
-            ++at_;
-            take_recipe_line(rest_of_line(), recipe_);
+            read_comment();
         }
     }
+
+    void read_comment();
 
     std::string_view text_;
     const std::string* where_;

@@ -46,7 +46,7 @@ std::string key_text(std::string_view quoted) {
         if (value.is_string())
             return value.get<std::string>();
     }
-    return std::string(quoted);
+    return std::string(quoted.substr(1, quoted.size() - std::min<std::size_t>(2, quoted.size())));
 }
 
 // One pass over the brackets and keys of text that may not be JSON at all: the parser itself would

@@ -122,8 +122,9 @@ void read_bins(const Table& table, Part& part) {
         if (!(bin.hi > bin.lo))
             table.refuse(row, hi, "must be above the lower edge");
         if (row > 0 && bin.lo != part.bins.back().hi)
-            table.refuse(row, lo, "the bin before ends at " + shortest(part.bins.back().hi) +
-                                      ", bins must touch, empty ones included");
+            table.refuse(row, lo,
+                         "the bin before ends at " + shortest(part.bins.back().hi) +
+                             ", bins must touch, empty ones included");
         part.bins.push_back({bin.lo, bin.hi, static_cast<std::uint64_t>(*n)});
     }
 }
@@ -169,8 +170,9 @@ void read_segments(const Table& table, const MeasurementSettings& settings, Part
         if (minor && !table.cell(row, *minor).empty()) {
             s.minor_px = table.number(row, *minor);
             if (!(*s.minor_px > 0 && *s.minor_px <= length_px))
-                table.refuse(row, *minor, "must be > 0 and at most the segment's length, " +
-                                              shortest(length_px));
+                table.refuse(row, *minor,
+                             "must be > 0 and at most the segment's length, " +
+                                 shortest(length_px));
         }
         part.diameters.push_back(s.diameter);
         part.segments.push_back(std::move(s));
@@ -282,9 +284,9 @@ void scale_to_greatest(Measurements& result) {
     Sample& sample = result.sample;
     if (sample.unit != LengthUnit::greatest)
         return;
-    const double greatest = sample.bins.empty() ? *std::max_element(sample.diameters.begin(),
-                                                                    sample.diameters.end())
-                                                : 1;
+    const double greatest =
+        sample.bins.empty() ? *std::max_element(sample.diameters.begin(), sample.diameters.end())
+                            : 1;
     for (Segment& s : result.segments)
         s.diameter /= greatest;
     if (!result.segments.empty())

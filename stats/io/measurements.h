@@ -12,9 +12,9 @@ namespace taihu {
 
 /// What a file may leave open, and the caller then says.
 struct MeasurementSettings {
-    std::optional<LengthUnit> unit;        ///< of the lengths; a file that names another is refused
-    std::optional<double> unit_per_px;     ///< of segments that have none of their own [unit / px], > 0
-    std::optional<double> area;            ///< searched in all files together [unit^2], > 0
+    std::optional<LengthUnit> unit;    ///< of the lengths; a file that names another is refused
+    std::optional<double> unit_per_px; ///< of segments that have none of their own [unit / px], > 0
+    std::optional<double> area;        ///< searched in all files together [unit^2], > 0
     std::optional<double> detection_limit; ///< nothing smaller was marked [unit], >= 0
 };
 
@@ -48,23 +48,25 @@ struct Measurements {
 ///   length * unit_per_px. An empty unit_per_px means: not known.
 /// - `plane,u_m,v_m,diameter_m` with `# area_m2=`: what `taihu section` writes, in metres.
 ///
-/// Columns may stand in any order. Several files are one sample: diameters are joined, areas add up,
-/// counts add up when the bins are the same; binned and other files do not mix.
+/// Columns may stand in any order. Several files are one sample: diameters are joined, areas add
+/// up, counts add up when the bins are the same; binned and other files do not mix.
 ///
 /// Unit: `# unit=m`, `px` or `greatest` in the file, or the setting. Without one, segments with no
-/// unit_per_px other than 1 are in px; scaled segments and the other kinds must have one. "greatest"
-/// means the greatest diameter is 1: segments are divided by their greatest, the others must be so.
-/// Area: `# area=` in unit^2, in every file or in none; the setting overrides. It is refused with
-/// segments whose unit is "greatest". Where every segment has its minor axis, the searched surface
-/// was seen at a slant: the area is divided by the mean of minor / major, which is what a picture
-/// shortens it by (a circle's image is an ellipse whose major axis keeps the diameter).
+/// unit_per_px other than 1 are in px; scaled segments and the other kinds must have one.
+/// "greatest" means the greatest diameter is 1: segments are divided by their greatest, the others
+/// must be so. Area: `# area=` in unit^2, in every file or in none; the setting overrides. It is
+/// refused with segments whose unit is "greatest". Where every segment has its minor axis, the
+/// searched surface was seen at a slant: the area is divided by the mean of minor / major, which is
+/// what a picture shortens it by (a circle's image is an ellipse whose major axis keeps the
+/// diameter).
 ///
 /// Two segments with the same ends on the same image make a warning, as does a comment key that
 /// looks like a slip of `unit` or `area`.
 ///
 /// \throws Error io: as read_file; bad_input: whatever is not as above, with file, line and column:
-///         cells that are no finite number, lengths of 0, counts that are no whole number >= 0, bins
-///         that do not touch, fewer than 8 profiles in all; bad_argument: a setting out of range.
+///         cells that are no finite number, lengths of 0, counts that are no whole number >= 0,
+///         bins that do not touch, fewer than 8 profiles in all; bad_argument: a setting out of
+///         range.
 Measurements read_measurements(std::span<const std::filesystem::path> paths,
                                const MeasurementSettings& settings = {});
 

@@ -41,7 +41,7 @@ TEST(Lod, EveryLevelKeepsItsBoundAsDecoded) {
         const TriMesh again = decode_draco(level.encoded.draco, "level");
         // Measured more densely than the chain does: samples miss a few per cent of the worst
         // point.
-        EXPECT_LE(two_sided_distance(again, reference, kVoxel / 6).max_m, 1.05 * level.bound_m);
+        EXPECT_LE(two_sided_distance(again, reference, kVoxel / 3).max_m, 1.05 * level.bound_m);
     }
 }
 
@@ -66,21 +66,14 @@ TEST(Lod, GridsNest) {
     }
 }
 
-TEST(Lod, NormalsPointOutOfTheSolidOrAreLeftOut) {
+TEST(Lod, NormalsAreTheFieldsOrLeftOut) {
+    const auto rock = holed_rock();
     for (const LodLevel& level : rock_chain().levels) {
         const TriMesh& mesh = level.encoded.decoded;
-        ASSERT_EQ(mesh.normals.size(), mesh.positions.size());
-        std::size_t n_outward = 0, n_corners = 0;
-        for (const Triangle& t : mesh.triangles) {
-            const Vec3 face = cross(mesh.positions[t[1]] - mesh.positions[t[0]],
-                                    mesh.positions[t[2]] - mesh.positions[t[0]]);
-            for (const std::uint32_t v : t) {
-                ++n_corners;
-                n_outward += dot(face, mesh.normals[v]) > 0;
-            }
-        }
-        // Across a rim the field's normal can be more than 90 degrees from one of its faces.
-        EXPECT_GT(static_cast<double>(n_outward), 0.97 * static_cast<double>(n_corners));
+        const std::vector<Vec3> expected = surface_normals(*rock, mesh.positions);
+        ASSERT_EQ(mesh.normals.size(), expected.size());
+        for (std::size_t i = 0; i < expected.size(); ++i) // 10 bits: at most about 0.3 degrees off
+            EXPECT_GT(dot(mesh.normals[i], expected[i]), 0.9999);
     }
     LodSettings plain = kSettings;
     plain.normals = false;

@@ -163,11 +163,11 @@ TEST(SnapToGrid, KeepsNormalsWithTheirVertices) {
     TriMesh ball = shaken_ball(0.125, 0.03, 2);
     for (std::size_t i = 0; i < ball.positions.size(); ++i)
         ball.normals.push_back(normalized(ball.positions[i]));
-    const SnapResult snapped = snap_to_grid(ball, position_grid(bounds(ball), 0.05));
+    const SnapResult snapped = snap_to_grid(ball, position_grid(bounds(ball), 0.15));
     ASSERT_GT(snapped.n_collapsed, 0u);
     ASSERT_EQ(snapped.mesh.normals.size(), snapped.mesh.positions.size());
     for (std::size_t i = 0; i < snapped.mesh.normals.size(); ++i)
-        EXPECT_GT(dot(snapped.mesh.normals[i], normalized(snapped.mesh.positions[i])), 0.9);
+        EXPECT_GT(dot(snapped.mesh.normals[i], normalized(snapped.mesh.positions[i])), 0.8);
 }
 
 TEST(SnapToGrid, RefusesAGridThatCannotHoldTheSurface) {

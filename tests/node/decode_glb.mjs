@@ -1,6 +1,6 @@
-// node decode_glb.mjs FILE.glb...: decodes each Draco primitive with draco3dgltf, a build of the decoder
-// that viewers use, and checks what the glTF validator does not look at: that accessors state what the
-// decoded arrays hold, and that every level is a closed 2-manifold that faces outwards.
+// node decode_glb.mjs FILE.glb...: decodes each Draco primitive with draco3dgltf, a build of the
+// decoder that viewers use, and checks what the glTF validator does not look at: that accessors
+// state what the decoded arrays hold, and that every level is a closed 2-manifold facing outwards.
 import fs from 'node:fs';
 import { load } from './modules.mjs';
 
@@ -17,8 +17,8 @@ function parseGlb(bytes) {
   check(view.getUint32(8, true) === bytes.length, 'the header states another length');
   const jsonLength = view.getUint32(12, true);
   check(view.getUint32(16, true) === 0x4e4f534a, 'the first chunk is not JSON');
-  const json = JSON.parse(new TextDecoder('utf-8', { fatal: true }).decode(bytes.subarray(20, 20 + jsonLength)));
   const at = 20 + jsonLength;
+  const json = JSON.parse(new TextDecoder('utf-8', { fatal: true }).decode(bytes.subarray(20, at)));
   check(view.getUint32(at + 4, true) === 0x004e4942, 'the second chunk is not BIN');
   const bin = bytes.subarray(at + 8, at + 8 + view.getUint32(at, true));
   check(at + 8 + bin.length === bytes.length, 'bytes behind the BIN chunk');
@@ -85,7 +85,8 @@ function decodePrimitive(draco, { json, bin }, primitive, label) {
   for (let i = 0; i < mesh.num_faces(); ++i) {
     decoder.GetFaceFromMesh(mesh, i, corners);
     faces.push([0, 1, 2].map((k) => corners.GetValue(k)));
-    check(faces[i].every((c) => c >= 0 && c < mesh.num_points()), `${label}: face ${i} out of range`);
+    const inRange = faces[i].every((corner) => corner >= 0 && corner < mesh.num_points());
+    check(inRange, `${label}: face ${i} out of range`);
   }
   for (const object of [corners, mesh, decoder, buffer]) draco.destroy(object);
   return { positions: arrays.POSITION, faces };
@@ -108,7 +109,7 @@ function weld({ positions, faces }) {
   return { points, faces: faces.map((face) => face.map((corner) => numbers[corner])) };
 }
 
-/** Every edge in exactly two faces, run through once each way; every vertex with one ring of faces. */
+/** Every edge in two faces, run through once each way; one ring of faces at every vertex. */
 function checkManifold({ points, faces }, label) {
   const next = points.map(() => new Map()); // around a vertex: from one neighbour to the next one
   faces.forEach(([a, b, c], i) => {

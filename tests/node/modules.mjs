@@ -1,5 +1,5 @@
-// Modules come from TAIHU_NODE_MODULES (a node_modules folder, or the folder that holds one) or from
-// the node_modules beside this file, so that nothing need be installed into the source tree.
+// Modules come from TAIHU_NODE_MODULES (a node_modules folder, or the folder that holds one) or
+// from the node_modules beside this file: nothing need be installed into the source tree.
 import fs from 'node:fs';
 import path from 'node:path';
 import { createRequire } from 'node:module';

@@ -1,5 +1,5 @@
-// node validate_glb.mjs FILE.glb...: the official glTF validator; exit 0 only without errors, warnings
-// and infos other than those that Draco data and lower levels of detail always cause.
+// node validate_glb.mjs FILE.glb...: the official glTF validator; exit 0 only without errors,
+// warnings and infos other than those that Draco data and lower levels always cause.
 import fs from 'node:fs';
 import path from 'node:path';
 import { load } from './modules.mjs';
@@ -16,7 +16,8 @@ const validator = load('gltf-validator');
 let failed = false;
 for (const file of files) {
   const bytes = new Uint8Array(fs.readFileSync(file));
-  const { issues } = await validator.validateBytes(bytes, { uri: path.basename(file), maxIssues: 0 });
+  const options = { uri: path.basename(file), maxIssues: 0 };
+  const { issues } = await validator.validateBytes(bytes, options);
   const wrong = issues.messages.filter((m) => m.severity < 2 || !kAllowed.has(m.code));
   for (const m of wrong)
     console.error(`${file}: ${kSeverity[m.severity]} ${m.code} ${m.pointer ?? ''}: ${m.message}`);

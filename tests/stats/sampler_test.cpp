@@ -81,9 +81,10 @@ TEST(HoleStream, IsAddressedByNumber) {
 // Recorded once: these bits must come out on every machine and of every later version.
 TEST(HoleStream, HasGoldenFirstHoles) {
     const HoleStream stream(Law::exponential(4), {{0, 0, 0}, {1, 2, 4}}, 1, 0);
-    const Sphere golden[] = {{{0x1.85b2a6985e8e3p-1, 0x1.3cb34fe5d7496p-1, 0x1.6dca99efb28f6p+0}, 0x1.96e8ee153aabdp-5},
-{{0x1.f4ac52c1f92d7p-1, 0x1.cb03a124a8e02p-1, 0x1.327820ab0a774p-1}, 0x1.5626280a59798p-6},
-{{0x1.5310927875069p-1, 0x1.324ae8bf1e509p+0, 0x1.ffff22aeff047p+1}, 0x1.667316928631cp-2}};
+    const Sphere golden[] = {
+        {{0x1.85b2a6985e8e3p-1, 0x1.3cb34fe5d7496p-1, 0x1.6dca99efb28f6p+0}, 0x1.96e8ee153aabdp-5},
+        {{0x1.f4ac52c1f92d7p-1, 0x1.cb03a124a8e02p-1, 0x1.327820ab0a774p-1}, 0x1.5626280a59798p-6},
+        {{0x1.5310927875069p-1, 0x1.324ae8bf1e509p+0, 0x1.ffff22aeff047p+1}, 0x1.667316928631cp-2}};
     for (std::uint64_t i = 0; i < 3; ++i)
         EXPECT_EQ(stream.hole(i), golden[i]) << i;
 }

@@ -1,16 +1,18 @@
 #include "mesh_out/io/image_file.h"
 
+#include <array>
 #include <cmath>
 #include <cstdint>
 #include <functional>
 
-#include <ImfChannelList.h>
-#include <ImfFrameBuffer.h>
-#include <ImfHeader.h>
-#include <ImfInputFile.h>
-#include <ImfStringAttribute.h>
+#include <OpenEXR/ImfChannelList.h>
+#include <OpenEXR/ImfFrameBuffer.h>
+#include <OpenEXR/ImfHeader.h>
+#include <OpenEXR/ImfInputFile.h>
+#include <OpenEXR/ImfStringAttribute.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <png.h>
 
 #include "stats/core/error.h"
 #include "stats/core/file.h"
@@ -101,6 +103,40 @@ TEST(PngImage, WithAFlippedBitIsRefused) {
     bytes[data + 20] = static_cast<char>(bytes[data + 20] ^ 8);
     write_file(folder / "b.png", bytes);
     expect_error(Fault::bad_input, "b.png: damaged PNG", [&] { read_png(folder / "b.png"); });
+}
+
+TEST(PngImage, OfAPaletteIsExpanded) {
+    const Scratch folder;
+    const std::array<png_byte, 9> palette = {255, 0, 0, 0, 255, 0, 0, 0, 188};
+    const std::array<png_byte, 4> indices = {0, 1, 2, 1};
+    png_image source{};
+    source.version = PNG_IMAGE_VERSION;
+    source.width = source.height = 2;
+    source.format = PNG_FORMAT_RGB_COLORMAP;
+    source.colormap_entries = 3;
+    ASSERT_TRUE(png_image_write_to_file(&source, (folder / "a.png").c_str(), 0, indices.data(), 0,
+                                        palette.data()));
+    const Image image = read_png(folder / "a.png");
+    ASSERT_EQ(image.channels, 3);
+    const float blue = image.at(0, 1)[2];
+    EXPECT_NEAR(srgb(blue), 188 / 255.0, 1e-6); // held in single precision
+    EXPECT_THAT(image.pixels, testing::ElementsAre(1, 0, 0, 0, 1, 0, 0, 0, blue, 0, 1, 0));
+}
+
+TEST(PngImage, OfSixteenBitsWithItsOwnGammaKeepsBoth) {
+    const Scratch folder;
+    const std::array<png_uint_16, 4> grey_alpha = {1000, 65535, 30000, 65535};
+    png_image source{};
+    source.version = PNG_IMAGE_VERSION;
+    source.width = 2;
+    source.height = 1;
+    source.format = PNG_FORMAT_LINEAR_Y_ALPHA; // libpng writes gAMA 1
+    ASSERT_TRUE(png_image_write_to_file(&source, (folder / "a.png").c_str(), 0, grey_alpha.data(),
+                                        0, nullptr));
+    const Image image = read_png(folder / "a.png");
+    ASSERT_EQ(image.channels, 2);
+    EXPECT_THAT(image.pixels, testing::ElementsAre(testing::FloatEq(1000 / 65535.0f), 1,
+                                                   testing::FloatEq(30000 / 65535.0f), 1));
 }
 
 /// A PNG of w x h grey pixels that has a header, one empty data chunk and nothing else.

@@ -1,0 +1,123 @@
+// taihu carve: a base minus holes.
+#include "stats/core/error.h"
+#include "stats/core/file.h"
+#include "stats/core/sha256.h"
+#include "stats/core/text.h"
+#include "stats/io/holes_file.h"
+#include "tools/holes_options.h"
+#include "tools/solid_files.h"
+#include "vdb_ops/carve.h"
+#include "vdb_ops/clean.h"
+#include "vdb_ops/recipe.h"
+
+namespace taihu {
+namespace {
+
+struct CarveArgs {
+    SolidOptions base;
+    std::filesystem::path holes, out;
+    PlacementOptions placement;
+    std::string pieces = "largest", bubbles = "fill";
+    SurfaceOptions surface;
+};
+
+/// The holes of a table, or of a law placed in the base.
+LawHoles read_or_place(const CarveArgs& args, const Solid& base, const Console& console) {
+    if (args.holes.extension() == ".json")
+        return place_law(args.holes, args.placement, base.measure,
+                         [&](const Law& law, const Placement& p) {
+                             return place_holes(law, p, *base.grid, console.progress);
+                         });
+    if (args.placement.any())
+        throw Error(Fault::bad_argument,
+                    args.holes.string() + ": a table says where its holes are; --scale, --count, "
+                                          "--porosity and --density are for a law.json");
+    LawHoles holes;
+    holes.placed.holes = read_holes(args.holes);
+    holes.node = holes_node(base_name(args.holes), sha256_hex(read_file(args.holes)));
+    return holes;
+}
+
+CleanSettings clean_settings(const CarveArgs& args) {
+    CleanSettings settings;
+    settings.fill_bubbles = args.bubbles == "fill";
+    if (args.pieces == "all") {
+        settings.n_pieces.reset();
+    } else if (args.pieces != "largest") {
+        const auto n = parse_integer(args.pieces);
+        if (!n || *n < 1)
+            throw Error(Fault::bad_argument, "--pieces: '" + printable(args.pieces) +
+                                                 "' must be largest, all, or a number >= 1");
+        settings.n_pieces = static_cast<std::size_t>(*n);
+    }
+    return settings;
+}
+
+void tell(const CarveArgs& args, const LawHoles& holes, const CarveResult& carved,
+          const CleanResult& cleaned, const Console& console) {
+    const std::string where = args.out.string();
+    console.say_all(where, holes.comments);
+    console.say("{}: carved {} holes ({} below 1.5 voxels), porosity {:.4f}, removed {:.4g} m^3", where,
+                holes.placed.holes.size(), carved.n_unresolved, carved.porosity(), carved.removed_m3);
+    console.say("{}: {} pieces, {} removed ({:.3g} m^3); {} sealed bubbles, {} filled ({:.3g} m^3)",
+                where, cleaned.n_pieces, cleaned.n_pieces_removed, cleaned.removed_m3,
+                cleaned.n_bubbles, cleaned.n_bubbles_filled, cleaned.filled_m3);
+}
+
+void run(const CarveArgs& args, const Console& console) {
+    check_solid_path(args.out);
+    console.may_write(args.out);
+    const CleanSettings cleaning = clean_settings(args);
+    const Solid base = read_solid(args.base, console);
+    const LawHoles holes = read_or_place(args, base, console);
+    report_stage(console.progress, "carving");
+    const CarveResult carved = carve(*base.grid, holes.placed.holes, console.progress);
+    report_stage(console.progress, "cleaning");
+    const CleanResult cleaned = clean(*carved.rock, cleaning, console.progress);
+    const std::string recipe = format_recipe(
+        clean_node(difference_node(base.node, holes.node), cleaning.n_pieces, cleaning.fill_bubbles),
+        base.measure.voxel_m, args.placement.seed);
+    tell(args, holes, carved, cleaned, console);
+    auto json = write_solid(args.out, *cleaned.solid, recipe, args.surface, console);
+    json["holes"] = holes.placed.holes.size();
+    json["unresolved"] = carved.n_unresolved;
+    json["base_m3"] = carved.base_m3;
+    json["removed_m3"] = carved.removed_m3;
+    json["porosity"] = carved.porosity();
+    json["pieces"] = cleaned.n_pieces;
+    json["pieces_removed"] = cleaned.n_pieces_removed;
+    json["pieces_removed_m3"] = cleaned.removed_m3;
+    json["bubbles"] = cleaned.n_bubbles;
+    json["bubbles_filled"] = cleaned.n_bubbles_filled;
+    json["bubbles_filled_m3"] = cleaned.filled_m3;
+    json["found"] = base.found;
+    console.result(json);
+}
+
+} // namespace
+
+void add_carve(CLI::App& app, Console& console) {
+    auto args = std::make_shared<CarveArgs>();
+    auto* verb = console.verb(
+        app, "carve", "Subtract holes from a base: a table of them, or a law placed in it",
+        "  taihu carve base.vdb --holes holes.csv -o rock.vdb\n"
+        "  taihu carve bunny.obj --holes law.json --scale 25% --porosity 0.25 --dim 256 -o rock.glb\n"
+        "  taihu carve base.vdb --holes holes.csv --pieces all -o rock.ply --json");
+    verb->add_option("base", args->base.path, "Solid to carve (.vdb, or a mesh to voxelize)")
+        ->required();
+    verb->add_option("--holes", args->holes, "Table x_m,y_m,z_m,radius_m (.csv) or a law (.json)")
+        ->required();
+    verb->add_option("-o,--output", args->out, "Where to write it (.vdb .obj .ply .stl .off .glb)")
+        ->required();
+    args->placement.add_options(*verb);
+    verb->add_option("--pieces", args->pieces, "Keep the largest, all, or this many pieces")
+        ->capture_default_str();
+    verb->add_option("--bubbles", args->bubbles, "Voids that no way leads to: fill or keep")
+        ->check(CLI::IsMember({"fill", "keep"}))
+        ->capture_default_str();
+    args->base.add_voxel_options(*verb);
+    args->surface.add_options(*verb);
+    verb->callback([args, &console] { run(*args, console); });
+}
+
+} // namespace taihu

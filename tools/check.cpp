@@ -1,0 +1,52 @@
+// taihu check: the certificate of a file, from the file itself.
+#include "mesh_out/certificate.h"
+#include "mesh_out/extract.h"
+#include "stats/core/error.h"
+#include "tools/solid_files.h"
+#include "vdb_ops/vdb_file.h"
+
+namespace taihu {
+namespace {
+
+constexpr int kSaysNo = 3;
+
+std::vector<TriMesh> levels_of(const SolidOptions& options, const Console& console) {
+    if (is_vdb(options.path))
+        return {extract_uniform(*read_vdb(options.path).solid, console.progress)};
+    return read_mesh(options.path, options.mesh_settings(), console.progress).levels;
+}
+
+void run(const SolidOptions& options, const Console& console) {
+    const std::string where = options.path.string();
+    nlohmann::ordered_json json = {{"file", where}, {"holds", true}, {"levels", nullptr}};
+    json["levels"] = nlohmann::ordered_json::array();
+    bool holds = true;
+    const std::vector<TriMesh> levels = levels_of(options, console);
+    for (std::size_t j = 0; j < levels.size(); ++j) {
+        report_stage(console.progress, "checking");
+        const Certificate c = certify(levels[j]);
+        holds = holds && c.holds();
+        json["levels"].push_back(certificate_json(c));
+        console.say("{}: {}{}{}", where, levels.size() > 1 ? fmt::format("level {}: ", j) : "",
+                    c.holds() ? "" : "NO: ", certificate_line(c));
+    }
+    json["holds"] = holds;
+    console.result(json);
+    if (!holds)
+        throw CLI::RuntimeError(kSaysNo);
+}
+
+} // namespace
+
+void add_check(CLI::App& app, Console& console) {
+    auto args = std::make_shared<SolidOptions>();
+    auto* verb = console.verb(
+        app, "check", "Say whether a file holds closed, manifold, outward surfaces (exit 3 if not)",
+        "  taihu check rock.glb\n"
+        "  taihu check scan.stl --json | jq .levels[0].boundary_edges");
+    verb->add_option("file", args->path, "File to check (.vdb .obj .ply .stl .off .glb)")->required();
+    args->add_mesh_options(*verb);
+    verb->callback([args, &console] { run(*args, console); });
+}
+
+} // namespace taihu

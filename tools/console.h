@@ -1,0 +1,77 @@
+#pragma once
+#include <atomic>
+#include <cstdint>
+#include <filesystem>
+#include <memory>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include <CLI/CLI.hpp>
+#include <fmt/format.h>
+#include <nlohmann/json.hpp>
+
+#include "stats/core/progress.h"
+
+namespace taihu {
+
+/// Stages and percent on a terminal's stderr; silent anywhere else. Cancelled by SIGINT and SIGTERM.
+class TerminalProgress final : public Progress {
+public:
+    explicit TerminalProgress(bool visible) : visible_(visible) {}
+    ~TerminalProgress() override;
+    void stage(std::string_view name) override;
+    void fraction(double done) override;
+    bool cancelled() const override;
+
+private:
+    void print(int percent);
+    bool visible_;
+    std::atomic<int> percent_{-1};
+    std::string stage_;
+};
+
+/// What every verb has: its streams, its common options, its progress.
+/// stdout carries the result alone; people are told on stderr.
+struct Console {
+    bool json = false, quiet = false, no_clobber = false;
+    int n_threads = 0; ///< 0: all
+    Progress* progress = nullptr;
+
+    /// A verb with the common options and runnable examples in its help.
+    CLI::App* verb(CLI::App& app, const std::string& name, const std::string& does,
+                   const std::string& examples);
+
+    /// A line for people, unless -q.
+    template <class... Args>
+    void say(fmt::format_string<Args...> format, Args&&... args) const {
+        say_text(fmt::format(format, std::forward<Args>(args)...));
+    }
+    void say_text(const std::string& line) const;
+    /// Findings about `where`, one line each.
+    void say_all(const std::string& where, const std::vector<std::string>& lines) const;
+    /// The machine's result: with --json one object on stdout.
+    void result(const nlohmann::ordered_json& object) const;
+    /// \throws Error io when `path` exists and --no-clobber was given.
+    void may_write(const std::filesystem::path& path) const;
+};
+
+/// The signal that asked to stop, or 0.
+int stop_signal();
+/// Let SIGINT and SIGTERM cancel instead of kill.
+void catch_stop_signals();
+
+// One function a verb, each in the file of its name.
+void add_carve(CLI::App& app, Console& console);
+void add_check(CLI::App& app, Console& console);
+void add_fit(CLI::App& app, Console& console);
+void add_info(CLI::App& app, Console& console);
+void add_lod(CLI::App& app, Console& console);
+void add_measure(CLI::App& app, Console& console);
+void add_mesh(CLI::App& app, Console& console);
+void add_render(CLI::App& app, Console& console);
+void add_sample(CLI::App& app, Console& console);
+void add_shape(CLI::App& app, Console& console);
+void add_voxelize(CLI::App& app, Console& console);
+
+} // namespace taihu

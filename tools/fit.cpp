@@ -1,0 +1,120 @@
+// taihu fit: measured profiles as a law of hole diameters.
+#include "stats/fit.h"
+
+#include "stats/chi_squared.h"
+#include "stats/core/error.h"
+#include "stats/core/file.h"
+#include "stats/io/law_file.h"
+#include "stats/io/measurements.h"
+#include "stats/thesis.h"
+#include "tools/console.h"
+
+namespace taihu {
+namespace {
+
+struct FitArgs {
+    std::vector<std::filesystem::path> files;
+    std::filesystem::path out;
+    std::string method = "ml", unit;
+    MeasurementSettings settings;
+    FitSettings fit;
+};
+
+/// The tables of the thesis, from binned counts.
+void run_thesis(const FitArgs& args, const Measurements& measurements, const Console& console) {
+    if (!args.out.empty())
+        throw Error(Fault::bad_argument, "fit: --method thesis prints its tables and fits no law; drop "
+                                         "-o, or use --method ml");
+    if (measurements.sample.bins.empty())
+        throw Error(Fault::bad_input, args.files.front().string() +
+                                          ": the thesis' method takes binned counts "
+                                          "(diameter_lo,diameter_hi,count); bin the diameters");
+    const ThesisInversion inversion = thesis_inversion(measurements.sample.bins);
+    const std::vector<ThesisTest> tests = thesis_tests(inversion);
+    if (!console.json) {
+        fmt::print("{}", format_thesis_tables(inversion, tests));
+        return;
+    }
+    nlohmann::ordered_json json = {{"d", inversion.centers},
+                                   {"counts", inversion.counts},
+                                   {"f2", inversion.f2},
+                                   {"f3", inversion.f3},
+                                   {"density", inversion.density},
+                                   {"tests", nlohmann::ordered_json::array()}};
+    for (const ThesisTest& t : tests)
+        json["tests"].push_back({{"law", t.law},
+                                 {"chi_squared", t.chi_squared},
+                                 {"df", t.df},
+                                 {"critical", t.critical},
+                                 {"rejected", t.rejected}});
+    console.result(json);
+}
+
+void tell(const Fit& fit, const ChiSquaredTest& chi, const std::string& unit, const Console& console) {
+    const std::string per = unit == "greatest" ? "greatest diameter" : unit;
+    console.say("exponential: rate {:.4g} per {} ({:.0f} % interval {:.4g}..{:.4g}), mean diameter {:.4g}",
+                fit.law.parameters()[0], per, 100 * fit.level, fit.intervals[0].lo,
+                fit.intervals[0].hi, fit.law.mean());
+    console.say("{} profiles, detection limit {:.4g}, log-likelihood {:.2f}, AICc {:.1f}", fit.n_profiles,
+                fit.detection_limit, fit.log_likelihood, fit.aicc);
+    console.say("chi-squared on the profiles: {:.2f}, df {}, p {:.2f}", chi.statistic, chi.df, chi.p_value);
+    if (fit.n_v)
+        console.say("holes per {}^3: {:.4g} ({:.4g}..{:.4g}), {:.0f} % of them below the detection limit",
+                    per, fit.n_v->estimate, fit.n_v->lo, fit.n_v->hi, 100 * fit.n_v->extrapolated_share);
+    else
+        console.say("holes per volume: unknown, because the area searched is (--area)");
+    for (const std::string& note : fit.notes)
+        console.say_text(note);
+}
+
+void run(FitArgs& args, const Console& console) {
+    if (!args.unit.empty())
+        args.settings.unit = unit_from_name(args.unit);
+    const Measurements measurements = read_measurements(args.files, args.settings);
+    for (const std::string& warning : measurements.warnings)
+        console.say_text(warning);
+    if (args.method == "thesis")
+        return run_thesis(args, measurements, console);
+    const Fit fit = fit_exponential(measurements.sample, args.fit);
+    const std::string law = format_law_file(make_law_file(fit, measurements));
+    tell(fit, chi_squared_test(measurements.sample, fit.law, 1),
+         std::string(unit_name(measurements.sample.unit)), console);
+    if (!args.out.empty()) {
+        console.may_write(args.out);
+        write_file(args.out, law);
+        console.say("{}: the law", args.out.string());
+    }
+    console.result(nlohmann::ordered_json::parse(law));
+}
+
+} // namespace
+
+void add_fit(CLI::App& app, Console& console) {
+    auto args = std::make_shared<FitArgs>();
+    auto* verb = console.verb(
+        app, "fit", "Fit the law of hole diameters to profiles measured on pictures",
+        "  taihu fit rock1.csv -o law.json\n"
+        "  taihu fit segments.csv --area 1.2 --detection-limit 0.02 -o law.json\n"
+        "  taihu fit data/measurements/rock1.csv --method thesis");
+    verb->add_option("files", args->files,
+                     "Tables: diameter; diameter_lo,diameter_hi,count; or segments "
+                     "image,label,x1,y1,x2,y2,unit_per_px")
+        ->required();
+    verb->add_option("-o,--output", args->out, "Where to write the law (.json)");
+    verb->add_option("--method", args->method,
+                     "ml: maximum likelihood above the detection limit; thesis: the tables of the thesis")
+        ->check(CLI::IsMember({"ml", "thesis"}))
+        ->capture_default_str();
+    verb->add_option("--unit", args->unit, "Unit of the lengths: m, px or greatest [what the file says]");
+    verb->add_option("--scale", args->settings.unit_per_px,
+                     "Length of a pixel, for segments that have none [unit/px]");
+    verb->add_option("--area", args->settings.area, "Area searched in all files together [unit^2]");
+    verb->add_option("--detection-limit", args->settings.detection_limit,
+                     "Nothing smaller was marked [unit; the smallest marked]");
+    verb->add_option("--level", args->fit.level, "Of the intervals, 0.5..0.9999")
+        ->check(CLI::Range(0.5, 0.9999))
+        ->capture_default_str();
+    verb->callback([args, &console] { run(*args, console); });
+}
+
+} // namespace taihu

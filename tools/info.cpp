@@ -1,0 +1,114 @@
+// taihu info: what is in a file, and the recipe that made it.
+#include "stats/core/error.h"
+#include "stats/io/holes_file.h"
+#include "stats/io/law_file.h"
+#include "tools/solid_files.h"
+#include "vdb_ops/rasterize.h"
+#include "vdb_ops/vdb_file.h"
+
+namespace taihu {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+Json vdb_info(const std::filesystem::path& path) {
+    const VdbFile file = read_vdb(path);
+    const Lattice lattice = lattice_of(*file.solid);
+    const openvdb::CoordBBox box = file.solid->evalActiveVoxelBoundingBox();
+    return {{"kind", "level set"},
+            {"voxel_m", lattice.voxel_m},
+            {"half_width_vox", lattice.half_width_vox},
+            {"voxels", {box.dim().x(), box.dim().y(), box.dim().z()}},
+            {"active_voxels", file.solid->activeVoxelCount()},
+            {"leaves", file.solid->tree().leafCount()},
+            {"recipe", file.recipe}};
+}
+
+Json mesh_info(const SolidOptions& options, const Console& console) {
+    const MeshFile file = read_mesh(options.path, options.mesh_settings(), console.progress);
+    Json json = {{"kind", "mesh"}, {"levels", Json::array()}};
+    for (std::size_t j = 0; j < file.levels.size(); ++j) {
+        const Box box = bounds(file.levels[j]);
+        Json level = {{"vertices", file.levels[j].positions.size()},
+                      {"triangles", file.levels[j].triangles.size()},
+                      {"size_m", {box.size().x, box.size().y, box.size().z}}};
+        if (j < file.coverages.size())
+            level["screen_coverage"] = file.coverages[j];
+        json["levels"].push_back(level);
+    }
+    if (file.format == MeshFormat::glb) {
+        json["draco"] = file.draco;
+        json["generator"] = file.generator;
+    }
+    if (file.n_polygons > 0)
+        json["polygons"] = file.n_polygons;
+    json["recipe"] = file.recipe;
+    return json;
+}
+
+Json law_info(const std::filesystem::path& path) {
+    const LawFile file = read_law_file(path);
+    Json json = {{"kind", "law of hole diameters"},
+                 {"family", family_name(file.law.family())},
+                 {"unit", unit_name(file.unit)},
+                 {"mean_diameter", file.law.mean()},
+                 {"profiles", file.n_profiles}};
+    for (const SourceFile& source : file.source)
+        json["source"].push_back(source.name);
+    return json;
+}
+
+Json holes_info(const std::filesystem::path& path) {
+    const std::vector<Sphere> holes = read_holes(path);
+    Box box;
+    double smallest = holes.empty() ? 0 : 1e300, largest = 0;
+    for (const Sphere& h : holes) {
+        box.include(h.center);
+        smallest = std::min(smallest, h.radius_m);
+        largest = std::max(largest, h.radius_m);
+    }
+    return {{"kind", "holes"},
+            {"holes", holes.size()},
+            {"radius_m", {smallest, largest}},
+            {"box_m", {box.size().x, box.size().y, box.size().z}}};
+}
+
+void run(const SolidOptions& options, const Console& console) {
+    const std::string extension = options.path.extension().string();
+    Json json = {{"file", options.path.string()}};
+    if (is_vdb(options.path))
+        json.update(vdb_info(options.path));
+    else if (extension == ".json")
+        json.update(law_info(options.path));
+    else if (extension == ".csv")
+        json.update(holes_info(options.path));
+    else if (mesh_format(options.path))
+        json.update(mesh_info(options, console));
+    else
+        throw Error(Fault::unsupported, options.path.string() + ": unknown extension '" + extension +
+                                            "'; use .vdb, .obj, .ply, .stl, .off, .glb, .json or .csv");
+    if (json.contains("recipe")) { // text in the file, an object for people and programs
+        const std::string text = json["recipe"].get<std::string>();
+        json["recipe"] = text.empty() ? Json(nullptr) : Json::parse(text, nullptr, false);
+        if (json["recipe"].is_discarded())
+            json["recipe"] = text;
+    }
+    if (console.json)
+        return console.result(json);
+    for (const auto& [key, value] : json.items()) // the answer itself, so on stdout
+        fmt::print("{}: {}\n", key, value.is_string() ? value.get<std::string>() : value.dump());
+}
+
+} // namespace
+
+void add_info(CLI::App& app, Console& console) {
+    auto args = std::make_shared<SolidOptions>();
+    auto* verb = console.verb(app, "info", "Say what is in a file and which recipe made it",
+                              "  taihu info rock.glb\n"
+                              "  taihu info rock.vdb --json | jq .recipe");
+    verb->add_option("file", args->path, "Any file that taihu reads or writes")->required();
+    args->add_mesh_options(*verb);
+    verb->callback([args, &console] { run(*args, console); });
+}
+
+} // namespace taihu

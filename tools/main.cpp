@@ -1,0 +1,137 @@
+// The command `taihu`: verbs over files. Parses, calls, prints; the work is in the modules.
+#include <cstdio>
+#include <memory>
+#include <new>
+#include <optional>
+#include <unistd.h>
+
+#include <openvdb/openvdb.h>
+#include <tbb/global_control.h>
+
+#include "stats/core/error.h"
+#include "stats/core/text.h"
+#include "tools/console.h"
+
+namespace taihu {
+namespace {
+
+enum Exit { kDone = 0, kFailed = 1, kUsage = 2, kBug = 70, kSignalled = 128 };
+
+int fail(int code, const std::string& message) {
+    std::fprintf(stderr, "taihu: %s\n", printable(message, 280).c_str());
+    return code;
+}
+
+const CLI::App* find_verb(const CLI::App& app, int argc, char** argv) {
+    for (const CLI::App* verb : app.get_subcommands(nullptr))
+        if (argc > 1 && verb->get_name() == argv[1])
+            return verb;
+    return nullptr;
+}
+
+std::vector<std::string_view> verb_names(const CLI::App& app, std::vector<std::string>& storage) {
+    for (const CLI::App* verb : app.get_subcommands(nullptr))
+        storage.push_back(verb->get_name());
+    return {storage.begin(), storage.end()};
+}
+
+/// The first argument that no option of the verb knows, with the nearest that it does know.
+std::optional<std::string> unknown_option(const CLI::App& app, int argc, char** argv) {
+    const CLI::App* verb = find_verb(app, argc, argv);
+    if (!verb)
+        return std::nullopt;
+    std::vector<std::string> names;
+    for (const CLI::Option* option : verb->get_options())
+        for (const std::string& name : option->get_lnames())
+            names.push_back("--" + name);
+    const std::vector<std::string_view> known(names.begin(), names.end());
+    for (int i = 2; i < argc; ++i) {
+        const std::string_view argument(argv[i]);
+        const std::string_view name = argument.substr(0, argument.find('='));
+        if (name.starts_with("--") && name.size() > 2 &&
+            std::find(known.begin(), known.end(), name) == known.end())
+            return std::string(verb->get_name()) + ": unknown option '" + printable(name) + "'" +
+                   did_you_mean(name, known);
+    }
+    return std::nullopt;
+}
+
+/// CLI11's own complaints, as one line of ours.
+int usage_error(const CLI::App& app, int argc, char** argv, const CLI::ParseError& error) {
+    if (const auto unknown = unknown_option(app, argc, argv))
+        return fail(kUsage, *unknown);
+    const bool has_verb = find_verb(app, argc, argv) != nullptr;
+    if (!has_verb && argc > 1) {
+        std::vector<std::string> storage;
+        return fail(kUsage, "unknown verb '" + printable(argv[1]) + "'" +
+                                did_you_mean(argv[1], verb_names(app, storage)) +
+                                (std::string(" (taihu --help lists them)")));
+    }
+    return fail(kUsage, std::string(has_verb ? argv[1] : "taihu") + ": " + error.what());
+}
+
+int run(int argc, char** argv) {
+    CLI::App app("Rocks full of holes: measured on photos, carved as sparse volumes, meshed and "
+                 "certified");
+    app.set_version_flag("--version", "taihu " TAIHU_VERSION);
+    app.require_subcommand(1);
+    app.get_formatter()->column_width(34);
+    app.footer("\nLengths take units: 0.5m, 12mm, 2vox, 25%. `taihu VERB --help` explains a verb.");
+    Console console;
+    add_fit(app, console);
+    add_sample(app, console);
+    add_shape(app, console);
+    add_voxelize(app, console);
+    add_carve(app, console);
+    add_mesh(app, console);
+    add_lod(app, console);
+    add_check(app, console);
+    add_measure(app, console);
+    add_render(app, console);
+    add_info(app, console);
+    if (argc < 2) {
+        std::fputs(app.help().c_str(), stderr);
+        return kUsage;
+    }
+    catch_stop_signals();
+    std::optional<tbb::global_control> threads;
+    std::optional<TerminalProgress> progress;
+    // Between parsing and the verb's callback, options are known: set up what they ask for.
+    for (CLI::App* verb : app.get_subcommands(nullptr))
+        verb->parse_complete_callback([&] {
+            progress.emplace(!console.quiet && ::isatty(STDERR_FILENO));
+            console.progress = &*progress;
+            if (console.n_threads > 0)
+                threads.emplace(tbb::global_control::max_allowed_parallelism,
+                                static_cast<std::size_t>(console.n_threads));
+            openvdb::initialize();
+        });
+    try {
+        app.parse(argc, argv);
+    } catch (const CLI::CallForHelp& e) {
+        return app.exit(e);
+    } catch (const CLI::CallForVersion& e) {
+        return app.exit(e);
+    } catch (const CLI::RuntimeError& e) { // a verb's own exit code, such as check's 3
+        return e.get_exit_code();
+    } catch (const CLI::ParseError& e) {
+        return usage_error(app, argc, argv, e);
+    } catch (const Error& e) {
+        progress.reset();
+        if (e.fault() == Fault::cancelled && stop_signal() != 0)
+            return fail(kSignalled + stop_signal(), "stopped; no output was written");
+        return fail(e.fault() == Fault::bad_argument ? kUsage : kFailed, e.what());
+    } catch (const std::bad_alloc&) {
+        progress.reset();
+        return fail(kFailed, "out of memory; use a larger voxel or fewer holes");
+    } catch (const std::exception& e) {
+        progress.reset();
+        return fail(kBug, std::string("internal error: ") + e.what() + "; please report it");
+    }
+    return kDone;
+}
+
+} // namespace
+} // namespace taihu
+
+int main(int argc, char** argv) { return taihu::run(argc, argv); }

@@ -1,0 +1,42 @@
+// taihu mesh: the surface of a solid, certified.
+#include "stats/core/error.h"
+#include "tools/solid_files.h"
+#include "vdb_ops/recipe.h"
+
+namespace taihu {
+namespace {
+
+struct MeshArgs {
+    SolidOptions solid;
+    std::filesystem::path out;
+    SurfaceOptions surface;
+};
+
+void run(const MeshArgs& args, const Console& console) {
+    if (!mesh_format(args.out))
+        throw Error(Fault::unsupported, args.out.string() +
+                                            ": not a mesh format; use .obj, .ply, .stl, .off or .glb");
+    const Solid solid = read_solid(args.solid, console);
+    const std::string recipe = format_recipe(solid.node, solid.measure.voxel_m, 0);
+    console.result(write_solid(args.out, *solid.grid, recipe, args.surface, console));
+}
+
+} // namespace
+
+void add_mesh(CLI::App& app, Console& console) {
+    auto args = std::make_shared<MeshArgs>();
+    auto* verb = console.verb(app, "mesh",
+                              "Turn a solid into a closed mesh, adaptive within an error or uniform",
+                              "  taihu mesh rock.vdb -o rock.obj\n"
+                              "  taihu mesh rock.vdb --max-error 2mm -o rock.glb\n"
+                              "  taihu mesh rock.vdb --uniform -o rock.stl");
+    verb->add_option("solid", args->solid.path, "Level set to mesh (.vdb, or a mesh to remesh)")
+        ->required();
+    verb->add_option("-o,--output", args->out, "Where to write it (.obj .ply .stl .off .glb)")
+        ->required();
+    args->surface.add_options(*verb);
+    args->solid.add_voxel_options(*verb);
+    verb->callback([args, &console] { run(*args, console); });
+}
+
+} // namespace taihu

@@ -1,0 +1,89 @@
+// taihu shape: base shapes.
+#include "stats/core/error.h"
+#include "stats/core/file.h"
+#include "tools/solid_files.h"
+#include "vdb_ops/rasterize.h"
+#include "vdb_ops/recipe.h"
+#include "vdb_ops/shapes.h"
+#include "vdb_ops/voxelize.h"
+
+namespace taihu {
+namespace {
+
+struct ShapeArgs {
+    std::string kind, size = "1m", tube, voxel;
+    std::filesystem::path out;
+    ShapeSettings settings;
+    std::optional<int> dim;
+};
+
+/// The shape as the file says: a mesh as it is, a level set by its exact distances.
+void run(ShapeArgs& args, const Console& console) {
+    args.settings.kind = shape_kind(args.kind);
+    args.settings.size_m = parse_size("--size", args.size);
+    const Box box{args.settings.size_m * -0.5, args.settings.size_m * 0.5};
+    args.settings.tube_m = args.tube.empty() ? 0.25 * args.settings.size_m.x
+                                             : length_m("--tube", args.tube, {0, box.longest()});
+    check_solid_path(args.out);
+    console.may_write(args.out);
+    const std::string node = shape_node(args.settings);
+    nlohmann::ordered_json json = {{"file", args.out.string()}, {"kind", args.kind}};
+    const TriMesh mesh = shape_mesh(args.settings);
+    if (is_vdb(args.out)) {
+        Lattice lattice;
+        lattice.voxel_m = args.voxel.empty() ? voxel_for(box, args.dim.value_or(kDefaultDim))
+                                             : length_m("--voxel", args.voxel, {0, box.longest()});
+        refuse_if_too_large(area_m2(mesh), box, lattice.voxel_m);
+        report_stage(console.progress, "rasterizing");
+        const auto grid = rasterize(*shape_field(args.settings), lattice, console.progress);
+        json.update(write_solid(args.out, *grid,
+                                format_recipe(node, lattice.voxel_m, args.settings.seed), {}, console));
+    } else {
+        if (args.dim || !args.voxel.empty())
+            throw Error(Fault::bad_argument, "shape: --dim and --voxel are for a .vdb; a mesh takes "
+                                             "--subdivisions");
+        const MeshFormat format = *mesh_format(args.out);
+        write_file(args.out, format_mesh(mesh, format, format_recipe(node, 0, args.settings.seed)));
+        json["triangles"] = mesh.triangles.size();
+        json["volume_m3"] = signed_volume_m3(mesh);
+        console.say("{}: {}, {} triangles, {:.4g} m^3", args.out.string(), args.kind,
+                    mesh.triangles.size(), signed_volume_m3(mesh));
+    }
+    console.result(json);
+}
+
+} // namespace
+
+void add_shape(CLI::App& app, Console& console) {
+    auto args = std::make_shared<ShapeArgs>();
+    auto* verb = console.verb(
+        app, "shape", "Make a base shape as a level set or a mesh",
+        "  taihu shape boulder --size 0.7,1,0.6 --seed 7 -o base.ply\n"
+        "  taihu shape torus --size 1m --tube 30cm --dim 200 -o ring.vdb\n"
+        "  taihu shape icosphere --subdivisions 4 -o ball.obj");
+    ShapeSettings& s = args->settings;
+    verb->add_option("kind", args->kind,
+                     "sphere, ellipsoid, box, cylinder, torus, icosphere or boulder")
+        ->required();
+    verb->add_option("-o,--output", args->out, "Where to write it (.vdb .obj .ply .stl .off .glb)")
+        ->required();
+    verb->add_option("--size", args->size, "Extent: one length, or X,Y,Z; the centre is the origin")
+        ->capture_default_str();
+    verb->add_option("--tube", args->tube, "torus: thickness of the ring [a quarter of its width]");
+    verb->add_option("--subdivisions", s.subdivisions, "Round meshes: 20 * 4^N triangles, 0..8")
+        ->check(CLI::Range(0, 8))
+        ->capture_default_str();
+    verb->add_option("--relief", s.relief, "boulder: height of its lumps / radius, 0..0.9")
+        ->check(CLI::Range(0.0, 0.9))
+        ->capture_default_str();
+    verb->add_option("--lumps", s.lumps, "boulder: lumps per radius, 0.1..16")
+        ->check(CLI::Range(0.1, 16.0))
+        ->capture_default_str();
+    verb->add_option("--seed", s.seed, "boulder: which of them")->capture_default_str();
+    auto* dim = verb->add_option("--dim", args->dim, "A .vdb: voxels along the longest axis [256]")
+                    ->check(CLI::Range(4, 65536));
+    verb->add_option("--voxel", args->voxel, "or the size of a voxel, as 5mm")->excludes(dim);
+    verb->callback([args, &console] { run(*args, console); });
+}
+
+} // namespace taihu

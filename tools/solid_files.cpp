@@ -1,0 +1,175 @@
+#include "tools/solid_files.h"
+
+#include "mesh_out/extract.h"
+#include "stats/core/error.h"
+#include "stats/core/file.h"
+#include "stats/core/sha256.h"
+#include "vdb_ops/rasterize.h"
+#include "vdb_ops/recipe.h"
+#include "vdb_ops/vdb_file.h"
+#include "vdb_ops/voxelize.h"
+
+namespace taihu {
+namespace {
+
+/// Length of the longest axis of what lies inside.
+double longest_m(const openvdb::FloatGrid& grid) {
+    openvdb::CoordBBox box;
+    for (auto leaf = grid.tree().cbeginLeaf(); leaf; ++leaf)
+        for (auto v = leaf->cbeginValueOn(); v; ++v)
+            if (*v < 0)
+                box.expand(v.getCoord());
+    if (box.empty())
+        return 0;
+    // A surface passes about half a voxel beyond its outermost inside voxels.
+    return grid.voxelSize().x() * box.dim()[static_cast<int>(box.maxExtent())];
+}
+
+} // namespace
+
+bool is_vdb(const std::filesystem::path& path) { return path.extension() == ".vdb"; }
+
+void check_solid_path(const std::filesystem::path& path) {
+    if (!is_vdb(path) && !mesh_format(path))
+        throw Error(Fault::unsupported, path.string() + ": unknown extension '" +
+                                            path.extension().string() +
+                                            "'; use .vdb, .obj, .ply, .stl, .off or .glb");
+}
+
+void SolidOptions::add_mesh_options(CLI::App& verb) {
+    verb.add_option("--unit", unit_m, "A mesh file's unit of length [m]: 0.01 for centimetres")
+        ->check(CLI::Range(1e-9, 1e9))
+        ->capture_default_str();
+    verb.add_option("--up", up, "A mesh file's axis that points up")
+        ->check(CLI::IsMember({"y", "z"}))
+        ->capture_default_str();
+}
+
+void SolidOptions::add_voxel_options(CLI::App& verb) {
+    auto* by_dim = verb.add_option("--dim", dim,
+                                   "A mesh: voxels along its longest axis, 4..65536 [256]")
+                       ->check(CLI::Range(4, 65536));
+    verb.add_option("--voxel", voxel, "or the size of a voxel, as 5mm")->excludes(by_dim);
+    verb.add_option("--close", close, "An open mesh: cap its boundary loops, or refuse it")
+        ->check(CLI::IsMember({"loops", "none"}))
+        ->capture_default_str();
+    add_mesh_options(verb);
+}
+
+MeshReadSettings SolidOptions::mesh_settings() const {
+    return {unit_m, up == "z" ? UpAxis::z : UpAxis::y};
+}
+
+Solid read_solid(const SolidOptions& options, const Console& console) {
+    Solid solid;
+    const std::string name = base_name(options.path), where = options.path.string();
+    if (is_vdb(options.path)) {
+        if (options.dim || !options.voxel.empty())
+            throw Error(Fault::bad_argument,
+                        where + ": a level set keeps its own voxels; drop --dim and --voxel, or "
+                                "voxelize the mesh again");
+        VdbFile file = read_vdb(options.path);
+        solid.grid = file.solid;
+        const auto made = recipe_solid(file.recipe);
+        solid.node = made ? *made : file_node("level_set", name, sha256_hex(read_file(options.path)));
+    } else {
+        const MeshFile file = read_mesh(options.path, options.mesh_settings(), console.progress);
+        const TriMesh& mesh = file.levels.front();
+        VoxelizeSettings settings;
+        settings.close = options.close == "none" ? CloseRule::none : CloseRule::loops;
+        const Box box = bounds(mesh);
+        settings.voxel_m = options.voxel.empty()
+                               ? voxel_for(box, options.dim.value_or(kDefaultDim))
+                               : length_m("--voxel", options.voxel, {0, box.longest()});
+        report_stage(console.progress, "voxelizing");
+        VoxelizeResult result = voxelize(mesh, where, settings, console.progress);
+        solid.grid = result.solid;
+        solid.found = result.diagnosis.lines();
+        if (file.n_polygons > 0)
+            solid.found.push_back(fmt::format("{} polygons of more than three corners split",
+                                              file.n_polygons));
+        if (file.levels.size() > 1)
+            solid.found.push_back(fmt::format("the finest of {} levels taken", file.levels.size()));
+        console.say_all(where, solid.found);
+        solid.node = file_node("mesh", name, sha256_hex(read_file(options.path)), options.unit_m);
+    }
+    solid.measure = {lattice_of(*solid.grid).voxel_m, longest_m(*solid.grid)};
+    return solid;
+}
+
+void SurfaceOptions::add_options(CLI::App& verb) {
+    auto* bound = verb.add_option("--max-error", max_error,
+                                  "A mesh: no point farther than this from the uniform surface")
+                      ->capture_default_str();
+    verb.add_flag("--uniform", uniform, "A mesh: the plain extraction, two triangles a voxel")
+        ->excludes(bound);
+    verb.add_flag("--no-draco", no_draco, "A GLB: without Draco compression");
+}
+
+SurfaceSettings SurfaceOptions::settings(const Measure& measure) const {
+    SurfaceSettings s;
+    s.uniform = uniform;
+    s.draco = !no_draco;
+    s.max_error_m = length_m("--max-error", max_error, measure);
+    return s;
+}
+
+nlohmann::ordered_json certificate_json(const Certificate& c) {
+    return {{"holds", c.holds()},
+            {"vertices", c.n_vertices},
+            {"triangles", c.n_triangles},
+            {"boundary_edges", c.n_boundary_edges},
+            {"nonmanifold_edges", c.n_nonmanifold_edges},
+            {"nonmanifold_vertices", c.n_nonmanifold_vertices},
+            {"misoriented_edges", c.n_misoriented_edges},
+            {"degenerate_faces", c.n_degenerate_faces},
+            {"duplicate_faces", c.n_duplicate_faces},
+            {"components", c.n_components},
+            {"cavities", c.n_cavities},
+            {"genus", c.genus},
+            {"self_intersections", c.n_self_intersections},
+            {"volume_m3", c.volume_m3},
+            {"area_m2", c.area_m2}};
+}
+
+std::string certificate_line(const Certificate& c) {
+    if (!c.holds()) {
+        std::string line;
+        for (const std::string& fault : faults(c))
+            line += (line.empty() ? "" : ", ") + fault;
+        return line;
+    }
+    return fmt::format("closed 2-manifold, outward: {} triangles, {} piece{}, genus {}, {:.4g} m^3, {} "
+                       "self-intersection{}",
+                       c.n_triangles, c.n_components, c.n_components == 1 ? "" : "s", c.genus,
+                       c.volume_m3, c.n_self_intersections, c.n_self_intersections == 1 ? "" : "s");
+}
+
+nlohmann::ordered_json write_solid(const std::filesystem::path& path, const openvdb::FloatGrid& grid,
+                                   const std::string& recipe, const SurfaceOptions& surface,
+                                   const Console& console) {
+    console.may_write(path);
+    const Measure measure{lattice_of(grid).voxel_m, longest_m(grid)};
+    nlohmann::ordered_json json = {{"file", path.string()}};
+    if (is_vdb(path)) {
+        report_stage(console.progress, "writing");
+        write_vdb(path, grid, recipe);
+        json["leaves"] = grid.tree().leafCount();
+        console.say("{}: level set, voxel {:.4g} m, {} leaves", path.string(), measure.voxel_m,
+                    static_cast<std::size_t>(grid.tree().leafCount()));
+    } else {
+        const SurfaceFile file = format_surface(grid, *mesh_format(path), surface.settings(measure),
+                                                recipe, console.progress);
+        write_file(path, file.bytes);
+        json["bytes"] = file.bytes.size();
+        json["bound_m"] = file.bound_m;
+        json["error_m"] = file.error_m;
+        json["certificate"] = certificate_json(file.certificate);
+        console.say("{}: {}", path.string(), certificate_line(file.certificate));
+        console.say("{}: within {:.3g} m of the uniform surface (bound {:.3g} m), {} bytes",
+                    path.string(), file.error_m, file.bound_m, file.bytes.size());
+    }
+    return json;
+}
+
+} // namespace taihu
