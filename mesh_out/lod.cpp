@@ -16,9 +16,10 @@ namespace taihu {
 namespace {
 
 constexpr double kRoundingShare = 0.1;     ///< of a bound, for moving vertices onto the grid
-constexpr double kSimplifyingShare = 0.87; ///< of a bound; what is left covers what samples miss
-constexpr double kTighter = 0.75;
+constexpr double kSimplifyingShare = 0.82; ///< of a bound; what is left covers what samples miss
+constexpr double kTightest = 0.75; ///< by how much one more attempt may lower the inner bound
 constexpr int kAttempts = 4;
+constexpr int kReportVersion = 1;
 
 std::string shown(double value) {
     char text[32];
@@ -111,13 +112,15 @@ void Chain::refuse_bound(double bound_m, double error_m) const {
 bool Chain::next_level(int j, LodLevel& level) {
     const TriMesh& start = j == 0 ? reference_ : current_;
     double inner_m = kSimplifyingShare * bound_m(j);
-    for (int attempt = 0; attempt < kAttempts; ++attempt, inner_m *= kTighter) {
+    for (int attempt = 0; attempt < kAttempts; ++attempt) {
         TriMesh simplified = simplify(start, reference_, {.bound_m = inner_m}, progress_);
         if (j > 0 && simplified.triangles.size() >= start.triangles.size())
             return false;
         level = written(simplified, bound_m(j));
-        if (level.error_m > level.bound_m)
+        if (level.error_m > level.bound_m) {
+            inner_m *= std::max(kTightest, 0.97 * level.bound_m / level.error_m);
             continue;
+        }
         current_ = std::move(simplified);
         return true;
     }
@@ -195,6 +198,7 @@ std::string format_glb(const LodChain& chain, const GlbSettings& settings) {
 std::string format_report(const LodChain& chain) {
     const std::vector<double> coverages = screen_coverages(chain);
     nlohmann::ordered_json report;
+    report["taihu_report"] = kReportVersion;
     report["reference"] =
         "uniform surface of the level set; distances by closest point, both ways, "
         "on the decoded meshes";

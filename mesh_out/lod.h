@@ -50,7 +50,7 @@ LodChain make_lods(const openvdb::FloatGrid& solid, const LodSettings& settings,
 /// would pass one pixel of a screen 1080 pixels high.
 std::string format_glb(const LodChain& chain, const GlbSettings& settings = {});
 
-/// report.json of the chain: `levels` [{triangles, bytes, error_m, bound_m,
+/// report.json of the chain (data/schema/report.schema.json): `levels` [{triangles, bytes, error_m, bound_m,
 /// rms_m, genus, holes_closed, screen_coverage, ...}].
 std::string format_report(const LodChain& chain);
 

@@ -14,6 +14,8 @@ namespace taihu {
 double hull_volume_m3(const TriMesh& mesh) {
     if (mesh.triangles.empty())
         throw Error(Fault::bad_argument, "hull: the mesh has no triangle; give one that has");
+    if (mesh.positions.size() < 4)
+        return 0; // in a plane, and Qhull would call it an error
     std::vector<coordT> points;
     points.reserve(3 * mesh.positions.size());
     for (const Vec3& p : mesh.positions) {

@@ -74,7 +74,7 @@ Surface::Surface(const TriMesh& input, const TriMesh& reference_mesh,
     : mesh(to_half_edges(input, "simplify")), reference(reference_mesh), bound_m(settings.bound_m),
       min_turn_cosine(std::cos(settings.max_normal_turn_deg * std::numbers::pi / 180)),
       // The reference is flat on the scale of its own faces: no need to look much closer.
-      leaf_m(std::max(0.3 * bound_m, 0.2 * spacing_of(reference_mesh))),
+      leaf_m(std::max(0.3 * bound_m, 0.15 * spacing_of(reference_mesh))),
       length_weight(1e-3 * area_m2(input) / static_cast<double>(input.triangles.size())),
       center(bounds(input).center()), quadrics(input.positions.size()),
       stamps(input.positions.size(), 0), blocks(input.positions.size(), 0),
@@ -324,8 +324,7 @@ bool Worker::within(const Vec3& a, const Vec3& b, const Vec3& c, const Vec3& mid
     const Vec3 ab = (a + b) * 0.5, bc = (b + c) * 0.5, ca = (c + a) * 0.5;
     const auto corner = [&](const Vec3& p, const Vec3& q, const Vec3& r) {
         const Vec3 m = (p + q + r) / 3;
-        const double reach = std::min(s_.bound_m, (d + length(m - middle)) * (1 + 1e-9));
-        return within(p, q, r, m, s_.reference(m, reach));
+        return within(p, q, r, m, s_.reference(m, s_.bound_m));
     };
     return within(ab, bc, ca, middle, d) && corner(a, ab, ca) && corner(ab, b, bc) &&
            corner(ca, bc, c);

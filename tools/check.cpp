@@ -10,18 +10,25 @@ namespace {
 
 constexpr int kSaysNo = 3;
 
-std::vector<TriMesh> levels_of(const SolidOptions& options, const Console& console) {
-    if (is_vdb(options.path))
-        return {extract_uniform(*read_vdb(options.path).solid, console.progress)};
-    return read_mesh(options.path, options.mesh_settings(), console.progress).levels;
+MeshFile content(const SolidOptions& options, const Console& console) {
+    if (!is_vdb(options.path))
+        return read_mesh(options.path, options.mesh_settings(), console.progress);
+    MeshFile file;
+    file.levels = {extract_uniform(*read_vdb(options.path).solid, console.progress)};
+    return file;
 }
 
 void run(const SolidOptions& options, const Console& console) {
     const std::string where = options.path.string();
-    nlohmann::ordered_json json = {{"file", where}, {"holds", true}, {"levels", nullptr}};
-    json["levels"] = nlohmann::ordered_json::array();
-    bool holds = true;
-    const std::vector<TriMesh> levels = levels_of(options, console);
+    const MeshFile file = content(options, console);
+    const std::vector<TriMesh>& levels = file.levels;
+    bool holds = file.n_degenerate_faces == 0;
+    if (!holds)
+        console.say("{}: NO: {} faces without three different corners", where, file.n_degenerate_faces);
+    nlohmann::ordered_json json = {{"file", where},
+                                   {"holds", holds},
+                                   {"faces_without_three_corners", file.n_degenerate_faces},
+                                   {"levels", nlohmann::ordered_json::array()}};
     for (std::size_t j = 0; j < levels.size(); ++j) {
         report_stage(console.progress, "checking");
         const Certificate c = certify(levels[j]);

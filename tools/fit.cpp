@@ -50,14 +50,26 @@ void run_thesis(const FitArgs& args, const Measurements& measurements, const Con
     console.result(json);
 }
 
-void tell(const Fit& fit, const ChiSquaredTest& chi, const std::string& unit, const Console& console) {
+/// A small sample has a fit, but no chi-squared test.
+std::string chi_squared_line(const Sample& sample, const Fit& fit) {
+    try {
+        const ChiSquaredTest chi = chi_squared_test(sample, fit.law, 1);
+        return fmt::format("chi-squared on the profiles: {:.2f}, df {}, p {:.2f}", chi.statistic, chi.df,
+                           chi.p_value);
+    } catch (const Error& e) {
+        return e.what();
+    }
+}
+
+void tell(const Fit& fit, const Sample& sample, const Console& console) {
+    const std::string unit(unit_name(sample.unit));
     const std::string per = unit == "greatest" ? "greatest diameter" : unit;
     console.say("exponential: rate {:.4g} per {} ({:.0f} % interval {:.4g}..{:.4g}), mean diameter {:.4g}",
                 fit.law.parameters()[0], per, 100 * fit.level, fit.intervals[0].lo,
                 fit.intervals[0].hi, fit.law.mean());
     console.say("{} profiles, detection limit {:.4g}, log-likelihood {:.2f}, AICc {:.1f}", fit.n_profiles,
                 fit.detection_limit, fit.log_likelihood, fit.aicc);
-    console.say("chi-squared on the profiles: {:.2f}, df {}, p {:.2f}", chi.statistic, chi.df, chi.p_value);
+    console.say_text(chi_squared_line(sample, fit));
     if (fit.n_v)
         console.say("holes per {}^3: {:.4g} ({:.4g}..{:.4g}), {:.0f} % of them below the detection limit",
                     per, fit.n_v->estimate, fit.n_v->lo, fit.n_v->hi, 100 * fit.n_v->extrapolated_share);
@@ -77,8 +89,7 @@ void run(FitArgs& args, const Console& console) {
         return run_thesis(args, measurements, console);
     const Fit fit = fit_exponential(measurements.sample, args.fit);
     const std::string law = format_law_file(make_law_file(fit, measurements));
-    tell(fit, chi_squared_test(measurements.sample, fit.law, 1),
-         std::string(unit_name(measurements.sample.unit)), console);
+    tell(fit, measurements.sample, console);
     if (!args.out.empty()) {
         console.may_write(args.out);
         write_file(args.out, law);

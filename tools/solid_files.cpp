@@ -71,7 +71,7 @@ Solid read_solid(const SolidOptions& options, const Console& console) {
         VdbFile file = read_vdb(options.path);
         solid.grid = file.solid;
         const auto made = recipe_solid(file.recipe);
-        solid.node = made ? *made : file_node("level_set", name, sha256_hex(read_file(options.path)));
+        solid.node = made ? *made : level_set_node(name, sha256_hex(read_file(options.path)));
     } else {
         const MeshFile file = read_mesh(options.path, options.mesh_settings(), console.progress);
         const TriMesh& mesh = file.levels.front();
@@ -88,10 +88,14 @@ Solid read_solid(const SolidOptions& options, const Console& console) {
         if (file.n_polygons > 0)
             solid.found.push_back(fmt::format("{} polygons of more than three corners split",
                                               file.n_polygons));
+        if (file.n_degenerate_faces > 0)
+            solid.found.push_back(fmt::format("{} faces without three different corners left out",
+                                              file.n_degenerate_faces));
         if (file.levels.size() > 1)
             solid.found.push_back(fmt::format("the finest of {} levels taken", file.levels.size()));
         console.say_all(where, solid.found);
-        solid.node = file_node("mesh", name, sha256_hex(read_file(options.path)), options.unit_m);
+        solid.node = mesh_node(name, sha256_hex(read_file(options.path)), options.unit_m,
+                                options.up == "z");
     }
     solid.measure = {lattice_of(*solid.grid).voxel_m, longest_m(*solid.grid)};
     return solid;

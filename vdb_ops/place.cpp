@@ -18,6 +18,8 @@ constexpr double kTolerance = 0.005;     // of the porosity, absolute
 constexpr double kTail = 1e-7;           // share of diameters that the margin round a solid leaves out
 constexpr double kMaxSamples = 4e6;      // points at which porosity is counted
 constexpr std::uint64_t kMaxHoles = 100'000'000;
+constexpr std::uint64_t kMaxStreams = 64;       // tried for one porosity
+constexpr std::uint32_t kAnotherStream = 0x73747265;
 
 /// Where holes go: a box that holds it, whether a point lies inside, whether a ball meets it.
 class Region {
@@ -233,12 +235,10 @@ private:
     std::size_t n_all_ = 0, n_left_ = 0;
 };
 
-PlacedHoles place_porosity(const Law& law, const Placement& placement, const Region& region,
-                           Progress* progress) {
-    const double target = *placement.porosity;
-    PorositySamples samples(region);
-    const HoleStream stream(law, stationary_box(law, placement, region), placement.scale_m,
-                            placement.seed);
+/// The prefix of one stream whose porosity is nearest to the target; `next` is that of one hole more or
+/// fewer, on the other side of it.
+PlacedHoles place_prefix(const HoleStream& stream, double target, const Region& region,
+                         PorositySamples samples, double& next, Progress* progress) {
     PlacedHoles placed;
     double before = 0, now = 0;
     for (std::uint64_t i = 0; now < target; ++i) {
@@ -257,17 +257,36 @@ PlacedHoles place_porosity(const Law& law, const Placement& placement, const Reg
         now = samples.porosity();
         placed.holes.push_back(hole);
     }
+    next = before;
     if (!placed.holes.empty() && target - before < now - target) {
         placed.holes.pop_back();
-        now = before;
+        std::swap(next, now);
     }
-    if (std::fabs(now - target) > kTolerance)
-        throw Error(Fault::numeric, "holes: porosity " + std::to_string(target) +
-                                        " lies between " + std::to_string(before) + " and " +
-                                        std::to_string(std::max(now, target)) +
-                                        ", one hole apart; use a smaller scale, or another seed");
     placed.porosity = now;
     return placed;
+}
+
+PlacedHoles place_porosity(const Law& law, const Placement& placement, const Region& region,
+                           Progress* progress) {
+    const double target = *placement.porosity;
+    const PorositySamples samples(region);
+    const Box box = stationary_box(law, placement, region);
+    // One large hole may step over the target: then another stream of the same seed is tried.
+    PlacedHoles placed;
+    double next = 0;
+    for (std::uint64_t stream = 0; stream < kMaxStreams; ++stream) {
+        const auto w = Rng{placement.seed, kAnotherStream}.words(stream);
+        const std::uint64_t seed =
+            stream == 0 ? placement.seed : std::uint64_t{w[0]} << 32 | w[1];
+        placed = place_prefix(HoleStream(law, box, placement.scale_m, seed), target, region, samples, next,
+                              progress);
+        if (std::fabs(*placed.porosity - target) <= kTolerance)
+            return placed;
+    }
+    throw Error(Fault::numeric, "holes: porosity " + std::to_string(target) + " lies between " +
+                                    std::to_string(std::min(*placed.porosity, next)) + " and " +
+                                    std::to_string(std::max(*placed.porosity, next)) +
+                                    ", one hole apart; use a smaller scale");
 }
 
 PlacedHoles place(const Law& law, const Placement& placement, const Region& region,

@@ -49,12 +49,15 @@ std::string shape_node(const ShapeSettings& s) {
     return node(std::string(shape_name(s.kind)).c_str(), std::move(body));
 }
 
-std::string file_node(const std::string& kind, const std::string& name, const std::string& sha256,
-                      double unit_m) {
-    Json body = {{"file", name}, {"sha256", sha256}};
-    if (kind == "mesh")
-        body["unit_m"] = unit_m;
-    return node(kind.c_str(), std::move(body));
+std::string mesh_node(const std::string& name, const std::string& sha256, double unit_m, bool z_up) {
+    Json body = {{"file", name}, {"sha256", sha256}, {"unit_m", unit_m}};
+    if (z_up)
+        body["up"] = "z";
+    return node("mesh", std::move(body));
+}
+
+std::string level_set_node(const std::string& name, const std::string& sha256) {
+    return node("level_set", {{"file", name}, {"sha256", sha256}});
 }
 
 std::string holes_node(const std::string& name, const std::string& sha256) {

@@ -15,9 +15,10 @@ namespace taihu {
 /// a fixed order and numbers in their shortest form, so the same recipe is the same text.
 
 std::string shape_node(const ShapeSettings& shape);
-/// A file of a solid: its base name and hash. `kind` is "mesh" or "level_set"; `unit_m` of a mesh.
-std::string file_node(const std::string& kind, const std::string& name, const std::string& sha256,
-                      double unit_m = 1);
+/// A mesh file: its base name and hash, its unit of length, and whether its Z axis points up.
+std::string mesh_node(const std::string& name, const std::string& sha256, double unit_m, bool z_up);
+/// A level set that carries no recipe of its own.
+std::string level_set_node(const std::string& name, const std::string& sha256);
 /// Holes from a table.
 std::string holes_node(const std::string& name, const std::string& sha256);
 /// Holes from a law file.

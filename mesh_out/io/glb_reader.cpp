@@ -36,6 +36,12 @@ struct Placement {
                 (*this)(inner.at)};
     }
     bool mirrors() const { return dot(cross(axes[0], axes[1]), axes[2]) < 0; }
+    /// Normals turn by the cofactors: they stay at right angles to a stretched surface.
+    Vec3 normal(const Vec3& n) const {
+        return normalized((cross(axes[1], axes[2]) * n.x + cross(axes[2], axes[0]) * n.y +
+                           cross(axes[0], axes[1]) * n.z) *
+                          (mirrors() ? -1.0 : 1.0));
+    }
 };
 
 std::string path_of(const char* list, std::uint64_t index) {
@@ -45,7 +51,7 @@ std::string path_of(const char* list, std::uint64_t index) {
 class GlbReader {
 public:
     GlbReader(std::string_view bytes, const std::string& where, Progress* progress)
-        : document_(bytes, where), where_(where), bytes_(bytes), progress_(progress) {}
+        : document_(bytes, where), where_(where), progress_(progress) {}
 
     MeshFile read();
 
@@ -68,15 +74,17 @@ private:
     void check_draco(const DracoMesh& decoded, const Json& primitive, const Json& extension,
                      const std::string& path) const;
     void check_bounds(const TriMesh& mesh, const GltfAccessor& position) const;
-    void add_positions(const std::vector<Vec3>& positions, const Placement& placement,
-                       TriMesh& level);
+    void add_vertices(const std::vector<Vec3>& positions, const std::vector<Vec3>& normals,
+                      const Placement& placement, TriMesh& level);
+    std::vector<Vec3> read_vectors(const GltfArray& array) const;
+    std::vector<Vec3> read_normals(const Json& attributes, const std::string& path,
+                                   std::uint64_t n_vertices) const;
     void add_triangle_at(const Triangle& corners, std::size_t first, bool mirrored, bool face,
                          TriMesh& level);
     void spend(std::uint64_t n_items, const std::string& path);
 
     GlbDocument document_;
     const std::string& where_;
-    std::string_view bytes_;
     Progress* progress_;
     MeshFile file_;
     std::vector<char> visited_;
@@ -241,13 +249,40 @@ void GlbReader::spend(std::uint64_t n_items, const std::string& path) {
                        "place the mesh less often or split the file");
 }
 
-void GlbReader::add_positions(const std::vector<Vec3>& positions, const Placement& placement,
-                              TriMesh& level) {
+void GlbReader::add_vertices(const std::vector<Vec3>& positions, const std::vector<Vec3>& normals,
+                             const Placement& placement, TriMesh& level) {
+    if (level.normals.size() == level.positions.size()) // all so far have normals
+        for (const Vec3& n : normals)
+            level.normals.push_back(placement.normal(n));
     for (const Vec3& p : positions) {
         level.positions.push_back(placement(p));
         if (!is_finite(level.positions.back()))
             document_.fail("a placed position is not finite", "export it again");
     }
+}
+
+std::vector<Vec3> GlbReader::read_vectors(const GltfArray& array) const {
+    std::vector<Vec3> out(array.accessor.count);
+    for (std::size_t i = 0; i < out.size(); ++i) {
+        out[i] = {array.value(i, 0), array.value(i, 1), array.value(i, 2)};
+        if (!is_finite(out[i]))
+            document_.fail("element " + std::to_string(i) + " of " +
+                               path_of("accessors", array.accessor.index) + " is not finite",
+                           "mend the file or export it again");
+    }
+    return out;
+}
+
+std::vector<Vec3> GlbReader::read_normals(const Json& attributes, const std::string& path,
+                                          std::uint64_t n_vertices) const {
+    const auto index = document_.whole(attributes, "NORMAL", path + ".attributes");
+    if (!index)
+        return {};
+    const GltfArray normal = document_.array(*index);
+    if (normal.accessor.n_components != 3 || normal.accessor.count != n_vertices)
+        document_.fail(path_of("accessors", *index) + " is no array of a normal for each vertex",
+                       "export it again");
+    return read_vectors(normal);
 }
 
 /// \param face  false within strips and fans, where a repeated corner only carries the strip on.
@@ -303,15 +338,7 @@ void GlbReader::read_primitive(const Json& primitive, const std::string& path,
     spend(n_vertices + (mode == kTriangles ? n / 3 : n - 2), path);
 
     const std::size_t first = level.positions.size();
-    std::vector<Vec3> positions(n_vertices);
-    for (std::size_t i = 0; i < n_vertices; ++i) {
-        positions[i] = {position.value(i, 0), position.value(i, 1), position.value(i, 2)};
-        if (!is_finite(positions[i]))
-            document_.fail("position " + std::to_string(i) + " of " +
-                               path_of("accessors", position.accessor.index) + " is not finite",
-                           "mend the file or export it again");
-    }
-    add_positions(positions, placement, level);
+    add_vertices(read_vectors(position), read_normals(*attributes, path, n_vertices), placement, level);
     const bool mirrored = placement.mirrors();
     const auto corner = [&](std::size_t i) {
         if (!indices)
@@ -404,7 +431,7 @@ void GlbReader::read_draco(const Json& primitive, const Json& extension, const s
     spend(decoded.mesh.positions.size() + decoded.mesh.triangles.size(), path);
     file_.draco = true;
     const std::size_t first = level.positions.size();
-    add_positions(decoded.mesh.positions, placement, level);
+    add_vertices(decoded.mesh.positions, decoded.mesh.normals, placement, level);
     for (const Triangle& t : decoded.mesh.triangles)
         add_triangle_at(t, first, placement.mirrors(), true, level);
 }
@@ -426,6 +453,9 @@ MeshFile GlbReader::read() {
         report_fraction(progress_,
                         static_cast<double>(level + 1) / static_cast<double>(file_.levels.size()));
     }
+    for (TriMesh& level : file_.levels)
+        if (level.normals.size() != level.positions.size())
+            level.normals.clear(); // some primitive had none
     return std::move(file_);
 }
 

@@ -105,6 +105,9 @@ MeshFile parse_mesh(std::string_view bytes, MeshFormat format, const std::string
                 throw Error(Fault::bad_input,
                             where + ":1: a position is too large; check the unit");
         }
+        if (settings.up == UpAxis::z)
+            for (Vec3& n : level.normals)
+                n = {n.x, n.z, -n.y};
     }
     report_fraction(progress, 1);
     return file;

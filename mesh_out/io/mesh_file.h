@@ -43,8 +43,10 @@ struct MeshFile {
 /// content that contradicts it is an error. Quads and n-gons are triangulated (planar convex ones
 /// as fans, quads along the shorter diagonal, others by ear clipping in their best plane); corners
 /// that repeat their neighbour are dropped first. Equal positions of an STL become one vertex.
-/// Colours, texture coordinates and materials are skipped; normals are not read (they follow from
-/// the faces). GLB: all triangle primitives of the default scene with their node transforms; points
+/// Colours, texture coordinates and materials are skipped, and normals too (they follow from the
+/// faces), but for those of a GLB when every primitive has them.
+///
+/// GLB: all triangle primitives of the default scene with their node transforms; points
 /// and lines, skins and morph targets are ignored; at most 2^24 vertices and triangles, or one per
 /// byte. A GLB whose Draco data do not match its accessors is refused; accessor minima and maxima
 /// may be off by 1/256 of the largest side, because many encoders state those of their input.
@@ -62,8 +64,10 @@ MeshFile parse_mesh(std::string_view bytes, MeshFormat format, const std::string
 /// The bytes of a file: OBJ and OFF as text with 9 significant digits, PLY and STL binary
 /// little-endian float, GLB uncompressed (float positions, normals if there are any). `recipe` is
 /// kept where the format has a place for it (OBJ, OFF: '#' comment; PLY: comment; GLB:
-/// asset.extras), and given back by parse_mesh; an STL has none. \throws Error bad_argument: an
-/// empty mesh, an index out of range, a position that float cannot hold.
+/// asset.extras), and given back by parse_mesh (from a GLB as compact JSON); an STL has none.
+///
+/// \throws Error bad_argument: an empty mesh, an index out of range, a position that float cannot
+///   hold, normals that are not one unit vector per position.
 std::string format_mesh(const TriMesh& mesh, MeshFormat format, const std::string& recipe = {});
 
 } // namespace taihu

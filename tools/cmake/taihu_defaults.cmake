@@ -22,16 +22,6 @@ endfunction()
 # Every public header is also compiled alone.
 function(taihu_module name)
   cmake_parse_arguments(PARSE_ARGV 1 arg "" "" "SOURCES;HEADERS")
-  foreach(f IN LISTS arg_SOURCES) # TEMPORARY
-    if(NOT EXISTS ${CMAKE_CURRENT_SOURCE_DIR}/${f})
-      list(REMOVE_ITEM arg_SOURCES ${f})
-    endif()
-  endforeach()
-  foreach(f IN LISTS arg_HEADERS) # TEMPORARY
-    if(NOT EXISTS ${CMAKE_CURRENT_SOURCE_DIR}/${f})
-      list(REMOVE_ITEM arg_HEADERS ${f})
-    endif()
-  endforeach()
   add_library(taihu_${name})
   add_library(taihu::${name} ALIAS taihu_${name})
   set_target_properties(taihu_${name} PROPERTIES
@@ -48,14 +38,6 @@ endfunction()
 # taihu_tests(module SOURCES a_test.cpp ... LIBRARIES ...): one program, each test its own CTest entry.
 function(taihu_tests module)
   cmake_parse_arguments(PARSE_ARGV 1 arg "" "" "SOURCES;LIBRARIES")
-  foreach(f IN LISTS arg_SOURCES) # TEMPORARY
-    if(NOT EXISTS ${CMAKE_CURRENT_SOURCE_DIR}/${f})
-      list(REMOVE_ITEM arg_SOURCES ${f})
-    endif()
-  endforeach()
-  if(NOT arg_SOURCES)
-    return()
-  endif()
   add_executable(${module}_tests ${arg_SOURCES})
   taihu_defaults(${module}_tests)
   target_include_directories(${module}_tests PRIVATE ${PROJECT_SOURCE_DIR})

@@ -204,7 +204,7 @@ TEST(GlbReader, NamesWhatIsWrong) {
     Chunks chunks = small();
     chunks.bin.replace(0, 4, std::string("\0\0\xc0\x7f", 4));
     expect_refused(join(chunks), MeshFormat::glb, bad,
-                   {"position 0 of accessors[0] is not finite"});
+                   {"element 0 of accessors[0] is not finite"});
 }
 
 TEST(GlbReader, NamesWhatIsWrongWithTheContainer) {
@@ -261,6 +261,9 @@ TEST(PlainGlb, RoundTripsWithNormalsAndRecipe) {
     const MeshFile back = parse(bytes);
     EXPECT_EQ(back.levels[0].positions, ball.positions);
     EXPECT_EQ(back.levels[0].triangles, ball.triangles);
+    ASSERT_EQ(back.levels[0].normals.size(), ball.normals.size());
+    for (std::size_t i = 0; i < ball.normals.size(); ++i) // normals are floats in the file
+        EXPECT_LT(length(back.levels[0].normals[i] - ball.normals[i]), 1e-6);
     EXPECT_EQ(back.recipe, R"({"dim":[64],"seed":1})");
     EXPECT_EQ(back.generator, "taihu");
     const Json json = split(bytes).json;
@@ -269,6 +272,23 @@ TEST(PlainGlb, RoundTripsWithNormalsAndRecipe) {
     EXPECT_EQ(json["accessors"][0]["min"], Json({-1.0, -1.0, -1.0}));
     EXPECT_EQ(bytes.size() % 4, 0u);
     EXPECT_EQ(parse(format_mesh(ball, MeshFormat::glb, "no JSON")).recipe, "no JSON");
+}
+
+TEST(GlbReader, NormalsTurnWithTheirNodeAndStayAtRightAngles) {
+    Chunks chunks = split(format_mesh(grid_ball(4, 1, 0x1p-8), MeshFormat::glb, ""));
+    // Mirrored, turned a quarter about Z and stretched: x' = -y, y' = -2 x, z' = 3 z.
+    chunks.json["nodes"][0]["matrix"] = {0, -2, 0, 0, -1, 0, 0, 0, 0, 0, 3, 0, 5, 6, 7, 1};
+    const TriMesh mesh = parse(join(chunks)).levels[0];
+    ASSERT_EQ(mesh.normals.size(), mesh.positions.size());
+    EXPECT_GT(signed_volume_m3(mesh), 0);
+    for (const Triangle& t : mesh.triangles) {
+        const Vec3 face = cross(mesh.positions[t[1]] - mesh.positions[t[0]],
+                                mesh.positions[t[2]] - mesh.positions[t[0]]);
+        for (const std::uint32_t v : t)
+            EXPECT_GT(dot(face, mesh.normals[v]), 0);
+    }
+    chunks.json["meshes"][0]["primitives"][0]["attributes"].erase("NORMAL");
+    EXPECT_TRUE(parse(join(chunks)).levels[0].normals.empty());
 }
 
 TEST(FormatGlb, GivesBackEveryLevel) {

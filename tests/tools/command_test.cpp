@@ -1,0 +1,109 @@
+// What every verb owes its user: help, one line for an error, the right stream and exit code.
+#include <algorithm>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "tests/support/process.h"
+
+namespace taihu {
+namespace {
+
+using testing::HasSubstr;
+using testing::IsEmpty;
+using testing::StartsWith;
+
+const std::vector<std::string> kVerbs = {"fit",  "sample", "shape",   "voxelize", "carve", "mesh",
+                                         "lod",  "check",  "measure", "render",   "info"};
+
+long lines(const std::string& text) { return std::count(text.begin(), text.end(), '\n'); }
+
+TEST(Command, EveryVerbHasHelpWithExamples) {
+    const Scratch scratch;
+    const Finished all = run("taihu --help", scratch.path());
+    EXPECT_EQ(all.exit_code, 0);
+    for (const std::string& verb : kVerbs) {
+        EXPECT_THAT(all.out, HasSubstr("\n  " + verb + " "));
+        const Finished help = run("taihu " + verb + " --help", scratch.path());
+        EXPECT_EQ(help.exit_code, 0) << verb;
+        EXPECT_THAT(help.out, HasSubstr("\n  taihu " + verb + " ")) << verb;
+        EXPECT_THAT(help.err, IsEmpty()) << verb;
+    }
+}
+
+TEST(Command, WithoutArgumentsHelpGoesToStderr) {
+    const Scratch scratch;
+    const Finished said = run("taihu", scratch.path());
+    EXPECT_EQ(said.exit_code, 2);
+    EXPECT_THAT(said.out, IsEmpty());
+    EXPECT_THAT(said.err, HasSubstr("carve"));
+    for (const std::string& verb : kVerbs) {
+        const Finished bare = run("taihu " + verb, scratch.path());
+        EXPECT_EQ(bare.exit_code, 2) << verb;
+        EXPECT_THAT(bare.out, IsEmpty()) << verb;
+        EXPECT_EQ(lines(bare.err), 1) << bare.err;
+        EXPECT_THAT(bare.err, StartsWith("taihu: " + verb + ": "));
+    }
+}
+
+TEST(Command, MistypedWordsGetTheNearestOne) {
+    const Scratch scratch;
+    EXPECT_THAT(run("taihu crave", scratch.path()).err, HasSubstr("did you mean 'carve'?"));
+    const Finished option = run("taihu carve x --hols y", scratch.path());
+    EXPECT_EQ(option.exit_code, 2);
+    EXPECT_THAT(option.err, HasSubstr("carve: unknown option '--hols'; did you mean '--holes'?"));
+}
+
+TEST(Command, AMissingFileIsOneLineAndExit1) {
+    const Scratch scratch;
+    for (const char* command :
+         {"taihu fit none.csv", "taihu sample none.json --box 1 --count 3 -o h.csv",
+          "taihu voxelize none.obj -o a.vdb", "taihu carve none.vdb --holes h.csv -o a.vdb",
+          "taihu mesh none.vdb -o a.ply", "taihu lod none.vdb -o a.glb", "taihu check none.stl",
+          "taihu measure none.off", "taihu render none.glb -o a.png", "taihu info none.vdb"}) {
+        const Finished said = run(command, scratch.path());
+        EXPECT_EQ(said.exit_code, 1) << command;
+        EXPECT_EQ(lines(said.err), 1) << said.err;
+        EXPECT_THAT(said.err, StartsWith("taihu: ")) << command;
+        EXPECT_THAT(said.err, HasSubstr("none.")) << command;
+        EXPECT_THAT(said.out, IsEmpty()) << command;
+    }
+}
+
+TEST(Command, ValuesOutOfRangeAreUsageErrors) {
+    const Scratch scratch;
+    for (const char* command :
+         {"taihu shape boulder --relief 5 -o a.ply", "taihu shape bolder -o a.ply",
+          "taihu shape box --size -1 -o a.ply", "taihu shape sphere --dim 2 -o a.vdb",
+          "taihu shape box --size 1,2 -o a.ply", "taihu shape box --dim 64 -o a.ply"}) {
+        const Finished said = run(command, scratch.path());
+        EXPECT_EQ(said.exit_code, 2) << command << said.err;
+        EXPECT_EQ(lines(said.err), 1) << said.err;
+    }
+    EXPECT_FALSE(std::filesystem::exists(scratch / "a.ply"));
+}
+
+TEST(Command, NoClobberKeepsWhatIsThere) {
+    const Scratch scratch;
+    write_file(scratch / "a.ply", "mine");
+    const Finished said = run("taihu shape box --no-clobber -o a.ply", scratch.path());
+    EXPECT_EQ(said.exit_code, 1);
+    EXPECT_THAT(said.err, HasSubstr("a.ply: exists"));
+    EXPECT_EQ(read_file(scratch / "a.ply"), "mine");
+}
+
+TEST(Command, ASignalCancelsAndLeavesNothing) {
+    const Scratch scratch;
+    for (const auto& [signal, code] : {std::pair("INT", 130), std::pair("TERM", 143)}) {
+        const Finished said = run("timeout -s " + std::string(signal) +
+                                      " 0.5 taihu shape boulder --dim 4000 -q -o big.vdb; test $? = 124 || "
+                                      "exit 9; timeout --preserve-status -s " + signal +
+                                      " 0.5 taihu shape boulder --dim 4000 -q -o big.vdb",
+                                  scratch.path());
+        EXPECT_EQ(said.exit_code, code);
+        EXPECT_FALSE(std::filesystem::exists(scratch / "big.vdb"));
+    }
+}
+
+} // namespace
+} // namespace taihu

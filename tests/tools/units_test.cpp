@@ -1,0 +1,34 @@
+#include "tools/units.h"
+
+#include "tests/support/errors.h"
+
+namespace taihu {
+namespace {
+
+TEST(Units, LengthsTakeTheUnitsPeopleType) {
+    const Measure of{0.01, 2};
+    EXPECT_DOUBLE_EQ(length_m("--x", "0.5", of), 0.5);
+    EXPECT_DOUBLE_EQ(length_m("--x", "0.5m", of), 0.5);
+    EXPECT_DOUBLE_EQ(length_m("--x", "12mm", of), 0.012);
+    EXPECT_DOUBLE_EQ(length_m("--x", "3cm", of), 0.03);
+    EXPECT_DOUBLE_EQ(length_m("--x", "2e3um", of), 0.002);
+    EXPECT_DOUBLE_EQ(length_m("--x", "2vox", of), 0.02);
+    EXPECT_DOUBLE_EQ(length_m("--x", "25%", of), 0.5);
+}
+
+TEST(Units, EverythingElseIsRefusedByName) {
+    for (const char* bad : {"", "m", "-1m", "0", "1 m", "1,5m", "2km", "1e999", "nan"})
+        expect_error(Fault::bad_argument, "--x: '", [&] { length_m("--x", bad); });
+    expect_error(Fault::bad_argument, "in voxels has nothing", [] { length_m("--x", "2vox"); });
+    expect_error(Fault::bad_argument, "in percent has nothing", [] { length_m("--x", "2%"); });
+}
+
+TEST(Units, SizesAreOneLengthOrThree) {
+    EXPECT_EQ(parse_size("--size", "1m"), (Vec3{1, 1, 1}));
+    EXPECT_EQ(parse_size("--size", "1,50cm,2"), (Vec3{1, 0.5, 2}));
+    for (const char* bad : {"1,2", "1,2,3,4", "1,,2", ","})
+        expect_error(Fault::bad_argument, "--size", [&] { parse_size("--size", bad); });
+}
+
+} // namespace
+} // namespace taihu

@@ -1,0 +1,156 @@
+// One real job of every verb.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <nlohmann/json.hpp>
+
+#include "tests/support/process.h"
+
+namespace taihu {
+namespace {
+
+using nlohmann::json;
+using testing::HasSubstr;
+
+/// Run a command that must succeed, with --json, and give its object.
+json result(const std::string& command, const Scratch& scratch) {
+    const Finished said = run(command + " --json -q", scratch.path());
+    EXPECT_EQ(said.exit_code, 0) << command << '\n' << said.err;
+    EXPECT_EQ(said.err, "") << command;
+    const json object = json::parse(said.out, nullptr, false);
+    EXPECT_TRUE(object.is_object()) << command << '\n' << said.out;
+    return object;
+}
+
+const std::string kRock1 = TAIHU_DATA "/measurements/rock1.csv";
+
+TEST(Verbs, FromMeasurementsToACertifiedRock) {
+    const Scratch scratch;
+    const json law = result("taihu fit " + kRock1 + " -o law.json", scratch);
+    EXPECT_EQ(law["family"], "exponential");
+    EXPECT_NEAR(law["parameters"]["rate"].get<double>(), 5.54, 0.005);
+    result("taihu shape boulder --size 1,0.8,0.7 --seed 3 -o base.ply", scratch);
+    const json base = result("taihu voxelize base.ply --dim 96 -o base.vdb", scratch);
+    EXPECT_EQ(base["found"].size(), 0u);
+    const json holes =
+        result("taihu sample law.json --in base.vdb --scale 25% --porosity 0.2 -o holes.csv", scratch);
+    EXPECT_NEAR(holes["porosity"].get<double>(), 0.2, 0.005);
+    const json rock = result("taihu carve base.vdb --holes holes.csv -o rock.vdb", scratch);
+    EXPECT_NEAR(rock["porosity"].get<double>(), 0.2, 0.005);
+    EXPECT_NEAR(rock["base_m3"].get<double>(), base["volume_m3"].get<double>(), 1e-12);
+    const json chain = result("taihu lod rock.vdb --levels 3 -o rock.glb", scratch);
+    ASSERT_EQ(chain["levels"].size(), 3u);
+    for (std::size_t j = 0; j < 3; ++j) {
+        const json& level = chain["levels"][j];
+        EXPECT_LE(level["error_m"].get<double>(), level["bound_m"].get<double>());
+        if (j > 0) {
+            EXPECT_LT(level["triangles"].get<int>(), chain["levels"][j - 1]["triangles"].get<int>());
+        }
+    }
+    EXPECT_EQ(json::parse(read_file(scratch / "report.json")), chain);
+    const json check = result("taihu check rock.glb", scratch);
+    EXPECT_TRUE(check["holds"].get<bool>());
+    ASSERT_EQ(check["levels"].size(), 3u);
+    EXPECT_EQ(check["levels"][0]["components"], 1);
+    const json measures = result("taihu measure rock.vdb --base base.vdb", scratch);
+    EXPECT_GT(measures["porosity_hull"].get<double>(), 0.1);
+    EXPECT_NEAR(measures["porosity_base"].get<double>(), 0.2, 0.1); // bubbles were filled
+    result("taihu render rock.glb --size 64x64 --samples 2 -o rock.png", scratch);
+    result("taihu render rock.vdb --size 64x64 --samples 2 -o rock.exr", scratch);
+    EXPECT_THAT(read_file(scratch / "rock.png"), testing::StartsWith("\x89PNG"));
+    const json info = result("taihu info rock.glb", scratch);
+    const json& difference = info["recipe"]["solid"]["clean"]["of"]["difference"]["of"];
+    EXPECT_EQ(difference[0]["mesh"]["file"], "base.ply");
+    EXPECT_EQ(difference[1]["holes"]["file"], "holes.csv");
+    EXPECT_EQ(result("taihu info rock.vdb", scratch)["recipe"]["solid"], info["recipe"]["solid"]);
+}
+
+TEST(Verbs, TheThesisTablesAreThoseOfTheThesis) {
+    const Scratch scratch;
+    const Finished said = run("taihu fit " + kRock1 + " --method thesis", scratch.path());
+    EXPECT_EQ(said.exit_code, 0);
+    for (const char* number : {"16.33", "16.09", "4.92", "2.45", "2.39", "2.76", "0.62", "0.35", "0.70",
+                               "0.81", "0.86", "0.92", "0.98", "0.99", "72.911", "55.989", "5.714"})
+        EXPECT_THAT(said.out, HasSubstr(number));
+}
+
+TEST(Verbs, OutputsAreTheSameBytesOnAnyNumberOfThreads) {
+    const Scratch scratch;
+    result("taihu fit " + kRock1 + " -o law.json", scratch);
+    result("taihu shape boulder -o base.ply", scratch);
+    for (const std::string extension : {".vdb", ".glb"}) {
+        for (const std::string n : {"1", "2", "16"})
+            result("taihu carve base.ply --dim 64 --holes law.json --scale 30% --porosity 0.2 --threads " +
+                       n + " -o rock" + n + extension,
+                   scratch);
+        const std::string one = read_file(scratch / ("rock1" + extension));
+        EXPECT_EQ(read_file(scratch / ("rock2" + extension)), one);
+        EXPECT_EQ(read_file(scratch / ("rock16" + extension)), one);
+    }
+}
+
+TEST(Verbs, CarveWritesEveryFormatAndCheckReadsIt) {
+    const Scratch scratch;
+    write_file(scratch / "holes.csv", "x_m,y_m,z_m,radius_m\n0.4,0,0,0.3\n");
+    for (const char* name : {"a.vdb", "a.obj", "a.ply", "a.stl", "a.off", "a.glb"}) {
+        result("taihu shape sphere --dim 48 -o ball.vdb", scratch);
+        result(std::string("taihu carve ball.vdb --holes holes.csv -o ") + name, scratch);
+        const json check = result(std::string("taihu check ") + name, scratch);
+        EXPECT_TRUE(check["holds"].get<bool>()) << name;
+        EXPECT_EQ(check["levels"][0]["genus"], 0) << name;
+    }
+    const json uniform = result("taihu mesh a.vdb --uniform -o u.ply", scratch);
+    const json adaptive = result("taihu mesh a.vdb --max-error 0.5vox -o v.ply", scratch);
+    EXPECT_LT(adaptive["certificate"]["triangles"].get<int>(),
+              uniform["certificate"]["triangles"].get<int>() / 3);
+    // Half a voxel of 1/48 m over an area of 3 m^2 would be 0.03.
+    EXPECT_NEAR(adaptive["certificate"]["volume_m3"].get<double>(),
+                uniform["certificate"]["volume_m3"].get<double>(), 0.02);
+}
+
+TEST(Verbs, CheckSaysNoWithExit3) {
+    const Scratch scratch;
+    write_file(scratch / "open.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 1 4 3\n");
+    const Finished said = run("taihu check open.obj --json", scratch.path());
+    EXPECT_EQ(said.exit_code, 3);
+    EXPECT_FALSE(json::parse(said.out)["holds"].get<bool>());
+    EXPECT_THAT(said.err, HasSubstr("NO: 3 boundary edges"));
+}
+
+TEST(Verbs, ALawWithoutAScaleOrANumberIsRefused) {
+    const Scratch scratch;
+    result("taihu fit " + kRock1 + " -o law.json", scratch);
+    result("taihu shape box --dim 32 -o base.vdb", scratch);
+    const Finished scale = run("taihu carve base.vdb --holes law.json --count 3 -o a.vdb", scratch.path());
+    EXPECT_EQ(scale.exit_code, 2);
+    EXPECT_THAT(scale.err, HasSubstr("--scale"));
+    const Finished number = run("taihu carve base.vdb --holes law.json --scale 10% -o a.vdb", scratch.path());
+    EXPECT_EQ(number.exit_code, 2);
+    EXPECT_THAT(number.err, HasSubstr("--count"));
+}
+
+TEST(Verbs, HolesOfALawMayFollowItsOwnDensity) {
+    const Scratch scratch;
+    write_file(scratch / "d.csv", "# unit=m\n# area=2\ndiameter\n.1\n.12\n.2\n.15\n.11\n.3\n.13\n.14\n.1\n.18\n");
+    const json law = result("taihu fit d.csv --detection-limit 0.1 -o law.json", scratch);
+    ASSERT_TRUE(law["n_v"].is_object());
+    const json holes = result("taihu sample law.json --box 2,2,2 -o holes.csv", scratch);
+    // Touching holes of a Poisson process: more than those centred in the box, fewer than thrice.
+    const double inside = law["n_v"]["estimate"].get<double>() * 8;
+    EXPECT_GT(holes["holes"].get<double>(), 0.7 * inside);
+    EXPECT_LT(holes["holes"].get<double>(), 3 * inside);
+    EXPECT_THAT(read_file(scratch / "holes.csv"), HasSubstr("measured: the law's n_v"));
+}
+
+TEST(Verbs, PiecesAndBubblesAreKeptOnRequest) {
+    const Scratch scratch;
+    result("taihu shape sphere --dim 64 -o ball.vdb", scratch);
+    write_file(scratch / "holes.csv", "x_m,y_m,z_m,diameter_m\n0,0,0,0.4\n");
+    EXPECT_EQ(result("taihu carve ball.vdb --holes holes.csv -o a.vdb", scratch)["bubbles_filled"], 1);
+    const json kept = result("taihu carve ball.vdb --holes holes.csv --bubbles keep -o b.vdb", scratch);
+    EXPECT_EQ(kept["bubbles"], 1);
+    EXPECT_EQ(kept["bubbles_filled"], 0);
+    EXPECT_EQ(result("taihu check b.vdb", scratch)["levels"][0]["cavities"], 1);
+}
+
+} // namespace
+} // namespace taihu
