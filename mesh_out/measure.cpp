@@ -40,8 +40,8 @@ double hull_volume_m3(const TriMesh& mesh) {
     int n_long = 0, bytes_long = 0;
     qh_memfreeshort(&state, &n_long, &bytes_long);
     if (code != qh_ERRnone && code != qh_ERRsingular)
-        throw Error(Fault::numeric, "hull: Qhull gave up with code " + std::to_string(code) +
-                                        "; check the mesh");
+        throw Error(Fault::numeric,
+                    "hull: Qhull gave up with code " + std::to_string(code) + "; check the mesh");
     return volume;
 }
 

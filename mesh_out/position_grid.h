@@ -17,21 +17,23 @@ struct PositionGrid {
 /// The grid for `box` whose rounding moves no point farther than `max_move_m`: the largest power of
 /// two with step * sqrt(3) / 2 <= max_move_m. `origin_step_m` >= the step, a power of two, is what
 /// the origin is a multiple of (the coarsest level's step, so that grids of a chain nest).
-/// \throws Error numeric when that needs more than 18 bits, or points that float cannot hold exactly
+/// \throws Error numeric when that needs more than 18 bits, or points that float cannot hold
+/// exactly
 ///         (too far from the origin); the message names the finest step that fits.
 PositionGrid position_grid(const Box& box, double max_move_m, double origin_step_m = 0);
 
 struct SnapResult {
-    TriMesh mesh;                 ///< positions on the grid, all different, no zero-area triangle
-    std::size_t n_collapsed = 0;  ///< edges collapsed because their ends met
-    std::size_t n_moved = 0;      ///< vertices moved one step so as not to meet another
-    double max_move_m = 0;        ///< farthest that any vertex went [m]
+    TriMesh mesh;                ///< positions on the grid, all different, no zero-area triangle
+    std::size_t n_collapsed = 0; ///< edges collapsed because their ends met
+    std::size_t n_moved = 0;     ///< vertices moved one step so as not to meet another
+    double max_move_m = 0;       ///< farthest that any vertex went [m]
 };
 
 /// Move each vertex of a closed 2-manifold to the nearest grid point. Where two meet, their edge is
-/// collapsed if the surface stays a 2-manifold, else one moves to a free neighbouring point; the same
-/// for triangles that would lose their area. Welding equal positions afterwards changes nothing.
-/// \throws Error numeric when no arrangement was found (a grid far too coarse for the mesh).
+/// collapsed if the surface stays a 2-manifold, else one moves to a free neighbouring point; the
+/// same for triangles that would lose their area. Welding equal positions afterwards changes
+/// nothing. \throws Error numeric when no arrangement was found (a grid far too coarse for the
+/// mesh).
 SnapResult snap_to_grid(const TriMesh& mesh, const PositionGrid& grid);
 
 } // namespace taihu

@@ -30,17 +30,17 @@ private:
 
 /// Distances between two surfaces, both ways, by true closest points (never |field|).
 struct TwoSidedDistance {
-    double max_m = 0;              ///< larger of the two maxima (a sampled Hausdorff distance)
+    double max_m = 0; ///< larger of the two maxima (a sampled Hausdorff distance)
     double max_a_to_b_m = 0, max_b_to_a_m = 0;
-    double rms_m = 0;              ///< larger of the two root mean squares over the area
+    double rms_m = 0; ///< larger of the two root mean squares over the area
     std::size_t n_samples = 0;
 };
 
 /// Samples: all vertices, edge middles and face middles of each mesh, plus a regular barycentric
-/// pattern on faces whose longest edge exceeds `spacing_m`, so that no point of a face is farther than
-/// about `spacing_m` from a sample. Deterministic on any number of threads.
-/// \param spacing_m  > 0, and at least 1e-5 of the longer mesh.
-/// \throws Error bad_argument: another spacing, or what SurfaceDistance refuses.
+/// pattern on faces whose longest edge exceeds `spacing_m`, so that no point of a face is farther
+/// than about `spacing_m` from a sample. Deterministic on any number of threads. \param spacing_m
+/// > 0, and at least 1e-5 of the longer mesh. \throws Error bad_argument: another spacing, or what
+/// SurfaceDistance refuses.
 TwoSidedDistance two_sided_distance(const TriMesh& a, const TriMesh& b, double spacing_m);
 
 } // namespace taihu

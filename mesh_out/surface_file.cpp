@@ -8,7 +8,8 @@
 namespace taihu {
 namespace {
 
-// Rounding of positions to the grid of a file, as a share of the voxel: finer than any use of the mesh.
+// Rounding of positions to the grid of a file, as a share of the voxel: finer than any use of the
+// mesh.
 constexpr double kUniformMove = 1.0 / 64;
 
 /// The uniform surface on a position grid, so that every format can hold it exactly.
@@ -33,7 +34,8 @@ SurfaceFile format_surface(const openvdb::FloatGrid& solid, MeshFormat format,
         file.bound_m = kUniformMove * solid.voxelSize().x();
         file.error_m = two_sided_distance(level.decoded, surface, solid.voxelSize().x() / 2).max_m;
     } else {
-        LodChain chain = make_lods(solid, {.n_levels = 1, .bound_m = settings.max_error_m}, progress);
+        LodChain chain =
+            make_lods(solid, {.n_levels = 1, .bound_m = settings.max_error_m}, progress);
         file.bound_m = chain.levels[0].bound_m;
         file.error_m = chain.levels[0].error_m;
         level = std::move(chain.levels[0].encoded);

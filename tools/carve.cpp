@@ -1,4 +1,5 @@
 // taihu carve: a base minus holes.
+#include "vdb_ops/carve.h"
 #include "stats/core/error.h"
 #include "stats/core/file.h"
 #include "stats/core/sha256.h"
@@ -6,7 +7,6 @@
 #include "stats/io/holes_file.h"
 #include "tools/holes_options.h"
 #include "tools/solid_files.h"
-#include "vdb_ops/carve.h"
 #include "vdb_ops/clean.h"
 #include "vdb_ops/recipe.h"
 
@@ -57,8 +57,9 @@ void tell(const CarveArgs& args, const LawHoles& holes, const CarveResult& carve
           const CleanResult& cleaned, const Console& console) {
     const std::string where = args.out.string();
     console.say_all(where, holes.comments);
-    console.say("{}: carved {} holes ({} below 1.5 voxels), porosity {:.4f}, removed {:.4g} m^3", where,
-                holes.placed.holes.size(), carved.n_unresolved, carved.porosity(), carved.removed_m3);
+    console.say("{}: carved {} holes ({} below 1.5 voxels), porosity {:.4f}, removed {:.4g} m^3",
+                where, holes.placed.holes.size(), carved.n_unresolved, carved.porosity(),
+                carved.removed_m3);
     console.say("{}: {} pieces, {} removed ({:.3g} m^3); {} sealed bubbles, {} filled ({:.3g} m^3)",
                 where, cleaned.n_pieces, cleaned.n_pieces_removed, cleaned.removed_m3,
                 cleaned.n_bubbles, cleaned.n_bubbles_filled, cleaned.filled_m3);
@@ -74,9 +75,9 @@ void run(const CarveArgs& args, const Console& console) {
     const CarveResult carved = carve(*base.grid, holes.placed.holes, console.progress);
     report_stage(console.progress, "cleaning");
     const CleanResult cleaned = clean(*carved.rock, cleaning, console.progress);
-    const std::string recipe = format_recipe(
-        clean_node(difference_node(base.node, holes.node), cleaning.n_pieces, cleaning.fill_bubbles),
-        base.measure.voxel_m, args.placement.seed);
+    const std::string recipe = format_recipe(clean_node(difference_node(base.node, holes.node),
+                                                        cleaning.n_pieces, cleaning.fill_bubbles),
+                                             base.measure.voxel_m, args.placement.seed);
     tell(args, holes, carved, cleaned, console);
     auto json = write_solid(args.out, *cleaned.solid, recipe, args.surface, console);
     json["holes"] = holes.placed.holes.size();
@@ -101,7 +102,8 @@ void add_carve(CLI::App& app, Console& console) {
     auto* verb = console.verb(
         app, "carve", "Subtract holes from a base: a table of them, or a law placed in it",
         "  taihu carve base.vdb --holes holes.csv -o rock.vdb\n"
-        "  taihu carve bunny.obj --holes law.json --scale 25% --porosity 0.25 --dim 256 -o rock.glb\n"
+        "  taihu carve bunny.obj --holes law.json --scale 25% --porosity 0.25 --dim 256 -o "
+        "rock.glb\n"
         "  taihu carve base.vdb --holes holes.csv --pieces all -o rock.ply --json");
     verb->add_option("base", args->base.path, "Solid to carve (.vdb, or a mesh to voxelize)")
         ->required();

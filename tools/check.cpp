@@ -24,7 +24,8 @@ void run(const SolidOptions& options, const Console& console) {
     const std::vector<TriMesh>& levels = file.levels;
     bool holds = file.n_degenerate_faces == 0;
     if (!holds)
-        console.say("{}: NO: {} faces without three different corners", where, file.n_degenerate_faces);
+        console.say("{}: NO: {} faces without three different corners", where,
+                    file.n_degenerate_faces);
     nlohmann::ordered_json json = {{"file", where},
                                    {"holds", holds},
                                    {"faces_without_three_corners", file.n_degenerate_faces},
@@ -51,7 +52,8 @@ void add_check(CLI::App& app, Console& console) {
         app, "check", "Say whether a file holds closed, manifold, outward surfaces (exit 3 if not)",
         "  taihu check rock.glb\n"
         "  taihu check scan.stl --json | jq .levels[0].boundary_edges");
-    verb->add_option("file", args->path, "File to check (.vdb .obj .ply .stl .off .glb)")->required();
+    verb->add_option("file", args->path, "File to check (.vdb .obj .ply .stl .off .glb)")
+        ->required();
     args->add_mesh_options(*verb);
     verb->callback([args, &console] { run(*args, console); });
 }

@@ -11,11 +11,15 @@ namespace {
 
 volatile std::sig_atomic_t g_signal = 0;
 
-void on_signal(int signal) { g_signal = signal; }
+void on_signal(int signal) {
+    g_signal = signal;
+}
 
 } // namespace
 
-int stop_signal() { return g_signal; }
+int stop_signal() {
+    return g_signal;
+}
 
 void catch_stop_signals() {
     struct sigaction action {};
@@ -48,7 +52,9 @@ void TerminalProgress::print(int percent) {
         std::fprintf(stderr, "\r\033[K%s %d %%", stage_.c_str(), percent);
 }
 
-bool TerminalProgress::cancelled() const { return g_signal != 0; }
+bool TerminalProgress::cancelled() const {
+    return g_signal != 0;
+}
 
 CLI::App* Console::verb(CLI::App& app, const std::string& name, const std::string& does,
                         const std::string& examples) {
@@ -56,7 +62,8 @@ CLI::App* Console::verb(CLI::App& app, const std::string& name, const std::strin
     const std::string group = "Common options";
     verb->add_flag("--json", json, "Print the result as one JSON object on stdout")->group(group);
     verb->add_flag("-q,--quiet", quiet, "Say nothing but errors")->group(group);
-    verb->add_flag("--no-clobber", no_clobber, "Refuse to replace a file that exists")->group(group);
+    verb->add_flag("--no-clobber", no_clobber, "Refuse to replace a file that exists")
+        ->group(group);
     verb->add_option("--threads", n_threads, "Threads to use; results do not depend on it [all]")
         ->check(CLI::Range(1, 1024))
         ->group(group);
@@ -81,7 +88,8 @@ void Console::result(const nlohmann::ordered_json& object) const {
 
 void Console::may_write(const std::filesystem::path& path) const {
     if (no_clobber && std::filesystem::exists(path))
-        throw Error(Fault::io, path.string() + ": exists; choose another name, or drop --no-clobber");
+        throw Error(Fault::io,
+                    path.string() + ": exists; choose another name, or drop --no-clobber");
 }
 
 } // namespace taihu

@@ -15,7 +15,8 @@
 
 namespace taihu {
 
-/// Stages and percent on a terminal's stderr; silent anywhere else. Cancelled by SIGINT and SIGTERM.
+/// Stages and percent on a terminal's stderr; silent anywhere else. Cancelled by SIGINT and
+/// SIGTERM.
 class TerminalProgress final : public Progress {
 public:
     explicit TerminalProgress(bool visible) : visible_(visible) {}

@@ -23,8 +23,9 @@ struct FitArgs {
 /// The tables of the thesis, from binned counts.
 void run_thesis(const FitArgs& args, const Measurements& measurements, const Console& console) {
     if (!args.out.empty())
-        throw Error(Fault::bad_argument, "fit: --method thesis prints its tables and fits no law; drop "
-                                         "-o, or use --method ml");
+        throw Error(Fault::bad_argument,
+                    "fit: --method thesis prints its tables and fits no law; drop "
+                    "-o, or use --method ml");
     if (measurements.sample.bins.empty())
         throw Error(Fault::bad_input, args.files.front().string() +
                                           ": the thesis' method takes binned counts "
@@ -35,12 +36,10 @@ void run_thesis(const FitArgs& args, const Measurements& measurements, const Con
         fmt::print("{}", format_thesis_tables(inversion, tests));
         return;
     }
-    nlohmann::ordered_json json = {{"d", inversion.centers},
-                                   {"counts", inversion.counts},
-                                   {"f2", inversion.f2},
-                                   {"f3", inversion.f3},
-                                   {"density", inversion.density},
-                                   {"tests", nlohmann::ordered_json::array()}};
+    nlohmann::ordered_json json = {
+        {"d", inversion.centers},       {"counts", inversion.counts},
+        {"f2", inversion.f2},           {"f3", inversion.f3},
+        {"density", inversion.density}, {"tests", nlohmann::ordered_json::array()}};
     for (const ThesisTest& t : tests)
         json["tests"].push_back({{"law", t.law},
                                  {"chi_squared", t.chi_squared},
@@ -54,8 +53,8 @@ void run_thesis(const FitArgs& args, const Measurements& measurements, const Con
 std::string chi_squared_line(const Sample& sample, const Fit& fit) {
     try {
         const ChiSquaredTest chi = chi_squared_test(sample, fit.law, 1);
-        return fmt::format("chi-squared on the profiles: {:.2f}, df {}, p {:.2f}", chi.statistic, chi.df,
-                           chi.p_value);
+        return fmt::format("chi-squared on the profiles: {:.2f}, df {}, p {:.2f}", chi.statistic,
+                           chi.df, chi.p_value);
     } catch (const Error& e) {
         return e.what();
     }
@@ -64,15 +63,17 @@ std::string chi_squared_line(const Sample& sample, const Fit& fit) {
 void tell(const Fit& fit, const Sample& sample, const Console& console) {
     const std::string unit(unit_name(sample.unit));
     const std::string per = unit == "greatest" ? "greatest diameter" : unit;
-    console.say("exponential: rate {:.4g} per {} ({:.0f} % interval {:.4g}..{:.4g}), mean diameter {:.4g}",
-                fit.law.parameters()[0], per, 100 * fit.level, fit.intervals[0].lo,
-                fit.intervals[0].hi, fit.law.mean());
-    console.say("{} profiles, detection limit {:.4g}, log-likelihood {:.2f}, AICc {:.1f}", fit.n_profiles,
-                fit.detection_limit, fit.log_likelihood, fit.aicc);
+    console.say(
+        "exponential: rate {:.4g} per {} ({:.0f} % interval {:.4g}..{:.4g}), mean diameter {:.4g}",
+        fit.law.parameters()[0], per, 100 * fit.level, fit.intervals[0].lo, fit.intervals[0].hi,
+        fit.law.mean());
+    console.say("{} profiles, detection limit {:.4g}, log-likelihood {:.2f}, AICc {:.1f}",
+                fit.n_profiles, fit.detection_limit, fit.log_likelihood, fit.aicc);
     console.say_text(chi_squared_line(sample, fit));
     if (fit.n_v)
-        console.say("holes per {}^3: {:.4g} ({:.4g}..{:.4g}), {:.0f} % of them below the detection limit",
-                    per, fit.n_v->estimate, fit.n_v->lo, fit.n_v->hi, 100 * fit.n_v->extrapolated_share);
+        console.say(
+            "holes per {}^3: {:.4g} ({:.4g}..{:.4g}), {:.0f} % of them below the detection limit",
+            per, fit.n_v->estimate, fit.n_v->lo, fit.n_v->hi, 100 * fit.n_v->extrapolated_share);
     else
         console.say("holes per volume: unknown, because the area searched is (--area)");
     for (const std::string& note : fit.notes)
@@ -102,21 +103,23 @@ void run(FitArgs& args, const Console& console) {
 
 void add_fit(CLI::App& app, Console& console) {
     auto args = std::make_shared<FitArgs>();
-    auto* verb = console.verb(
-        app, "fit", "Fit the law of hole diameters to profiles measured on pictures",
-        "  taihu fit rock1.csv -o law.json\n"
-        "  taihu fit segments.csv --area 1.2 --detection-limit 0.02 -o law.json\n"
-        "  taihu fit data/measurements/rock1.csv --method thesis");
+    auto* verb =
+        console.verb(app, "fit", "Fit the law of hole diameters to profiles measured on pictures",
+                     "  taihu fit rock1.csv -o law.json\n"
+                     "  taihu fit segments.csv --area 1.2 --detection-limit 0.02 -o law.json\n"
+                     "  taihu fit data/measurements/rock1.csv --method thesis");
     verb->add_option("files", args->files,
                      "Tables: diameter; diameter_lo,diameter_hi,count; or segments "
                      "image,label,x1,y1,x2,y2,unit_per_px")
         ->required();
     verb->add_option("-o,--output", args->out, "Where to write the law (.json)");
-    verb->add_option("--method", args->method,
-                     "ml: maximum likelihood above the detection limit; thesis: the tables of the thesis")
+    verb->add_option(
+            "--method", args->method,
+            "ml: maximum likelihood above the detection limit; thesis: the tables of the thesis")
         ->check(CLI::IsMember({"ml", "thesis"}))
         ->capture_default_str();
-    verb->add_option("--unit", args->unit, "Unit of the lengths: m, px or greatest [what the file says]");
+    verb->add_option("--unit", args->unit,
+                     "Unit of the lengths: m, px or greatest [what the file says]");
     verb->add_option("--scale", args->settings.unit_per_px,
                      "Length of a pixel, for segments that have none [unit/px]");
     verb->add_option("--area", args->settings.area, "Area searched in all files together [unit^2]");

@@ -35,10 +35,12 @@ Placement placement_of(const LawFile& law, const PlacementOptions& options, cons
     if (!p.count && !p.porosity && !p.density_m3) {
         if (!law.n_v)
             throw Error(Fault::bad_argument,
-                        where + ": the law has no n_v, because the area searched is unknown; give one "
-                                "of --count, --porosity and --density");
+                        where +
+                            ": the law has no n_v, because the area searched is unknown; give one "
+                            "of --count, --porosity and --density");
         p.density_m3 = law.n_v->estimate / (p.scale_m * p.scale_m * p.scale_m);
-        comments.push_back(fmt::format("density {:.6g} per m^3 (measured: the law's n_v)", *p.density_m3));
+        comments.push_back(
+            fmt::format("density {:.6g} per m^3 (measured: the law's n_v)", *p.density_m3));
     }
     comments.push_back(fmt::format("seed {}", p.seed));
     return p;
@@ -48,15 +50,17 @@ Placement placement_of(const LawFile& law, const PlacementOptions& options, cons
 
 void PlacementOptions::add_options(CLI::App& verb) {
     const std::string group = "Placing a law";
-    verb.add_option("--scale", scale,
-                    "Length of one unit of the law: 0.4m, or 25% of the longest axis; needed unless the "
-                    "law is in metres")
+    verb.add_option(
+            "--scale", scale,
+            "Length of one unit of the law: 0.4m, or 25% of the longest axis; needed unless the "
+            "law is in metres")
         ->group(group);
-    auto* by_count = verb.add_option("--count", count, "Exactly this many centres inside")->group(group);
-    auto* by_porosity =
-        verb.add_option("--porosity", porosity, "Removed volume / volume, 0..0.95, met within 0.005")
-            ->check(CLI::Range(0.0, 0.95))
-            ->group(group);
+    auto* by_count =
+        verb.add_option("--count", count, "Exactly this many centres inside")->group(group);
+    auto* by_porosity = verb.add_option("--porosity", porosity,
+                                        "Removed volume / volume, 0..0.95, met within 0.005")
+                            ->check(CLI::Range(0.0, 0.95))
+                            ->group(group);
     auto* by_density =
         verb.add_option("--density", density, "Centres per m^3 [the law's own n_v]")->group(group);
     by_count->excludes(by_porosity)->excludes(by_density);

@@ -85,8 +85,9 @@ void run(const SolidOptions& options, const Console& console) {
     else if (mesh_format(options.path))
         json.update(mesh_info(options, console));
     else
-        throw Error(Fault::unsupported, options.path.string() + ": unknown extension '" + extension +
-                                            "'; use .vdb, .obj, .ply, .stl, .off, .glb, .json or .csv");
+        throw Error(Fault::unsupported,
+                    options.path.string() + ": unknown extension '" + extension +
+                        "'; use .vdb, .obj, .ply, .stl, .off, .glb, .json or .csv");
     if (json.contains("recipe")) { // text in the file, an object for people and programs
         const std::string text = json["recipe"].get<std::string>();
         json["recipe"] = text.empty() ? Json(nullptr) : Json::parse(text, nullptr, false);

@@ -18,11 +18,11 @@ struct LodArgs {
 void tell(const LodChain& chain, const std::string& where, const Console& console) {
     for (std::size_t j = 0; j < chain.levels.size(); ++j) {
         const LodLevel& level = chain.levels[j];
-        console.say("{}: level {}: {} triangles, {} bytes, error {:.3g} m (bound {:.3g} m), genus {}, {} "
-                    "self-intersections",
-                    where, j, level.certificate.n_triangles, level.encoded.draco.size(),
-                    level.error_m, level.bound_m, level.certificate.genus,
-                    level.certificate.n_self_intersections);
+        console.say(
+            "{}: level {}: {} triangles, {} bytes, error {:.3g} m (bound {:.3g} m), genus {}, {} "
+            "self-intersections",
+            where, j, level.certificate.n_triangles, level.encoded.draco.size(), level.error_m,
+            level.bound_m, level.certificate.genus, level.certificate.n_self_intersections);
     }
     if (!chain.note.empty())
         console.say("{}: {}", where, chain.note);
@@ -52,9 +52,10 @@ void run(LodArgs& args, const Console& console) {
 
 void add_lod(CLI::App& app, Console& console) {
     auto args = std::make_shared<LodArgs>();
-    auto* verb = console.verb(app, "lod", "Write levels of detail under error bounds as one Draco GLB",
-                              "  taihu lod rock.vdb -o rock.glb\n"
-                              "  taihu lod rock.vdb --levels 3 --max-error 1mm --factor 3 -o rock.glb");
+    auto* verb =
+        console.verb(app, "lod", "Write levels of detail under error bounds as one Draco GLB",
+                     "  taihu lod rock.vdb -o rock.glb\n"
+                     "  taihu lod rock.vdb --levels 3 --max-error 1mm --factor 3 -o rock.glb");
     verb->add_option("solid", args->solid.path, "Level set to mesh (.vdb, or a mesh to remesh)")
         ->required();
     verb->add_option("-o,--output", args->out, "Where to write the levels (.glb)")->required();
@@ -63,10 +64,12 @@ void add_lod(CLI::App& app, Console& console) {
         ->capture_default_str();
     verb->add_option("--max-error", args->max_error, "Error bound of the finest level")
         ->capture_default_str();
-    verb->add_option("--factor", args->settings.factor, "Each level's bound over the one before, > 1")
+    verb->add_option("--factor", args->settings.factor,
+                     "Each level's bound over the one before, > 1")
         ->check(CLI::Range(1.01, 100.0))
         ->capture_default_str();
-    verb->add_option("--report", args->report, "Where to write the figures [report.json beside it]");
+    verb->add_option("--report", args->report,
+                     "Where to write the figures [report.json beside it]");
     args->solid.add_voxel_options(*verb);
     verb->callback([args, &console] { run(*args, console); });
 }

@@ -134,4 +134,6 @@ int run(int argc, char** argv) {
 } // namespace
 } // namespace taihu
 
-int main(int argc, char** argv) { return taihu::run(argc, argv); }
+int main(int argc, char** argv) {
+    return taihu::run(argc, argv);
+}

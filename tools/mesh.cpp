@@ -14,8 +14,8 @@ struct MeshArgs {
 
 void run(const MeshArgs& args, const Console& console) {
     if (!mesh_format(args.out))
-        throw Error(Fault::unsupported, args.out.string() +
-                                            ": not a mesh format; use .obj, .ply, .stl, .off or .glb");
+        throw Error(Fault::unsupported,
+                    args.out.string() + ": not a mesh format; use .obj, .ply, .stl, .off or .glb");
     const Solid solid = read_solid(args.solid, console);
     const std::string recipe = format_recipe(solid.node, solid.measure.voxel_m, 0);
     console.result(write_solid(args.out, *solid.grid, recipe, args.surface, console));
@@ -25,11 +25,11 @@ void run(const MeshArgs& args, const Console& console) {
 
 void add_mesh(CLI::App& app, Console& console) {
     auto args = std::make_shared<MeshArgs>();
-    auto* verb = console.verb(app, "mesh",
-                              "Turn a solid into a closed mesh, adaptive within an error or uniform",
-                              "  taihu mesh rock.vdb -o rock.obj\n"
-                              "  taihu mesh rock.vdb --max-error 2mm -o rock.glb\n"
-                              "  taihu mesh rock.vdb --uniform -o rock.stl");
+    auto* verb = console.verb(
+        app, "mesh", "Turn a solid into a closed mesh, adaptive within an error or uniform",
+        "  taihu mesh rock.vdb -o rock.obj\n"
+        "  taihu mesh rock.vdb --max-error 2mm -o rock.glb\n"
+        "  taihu mesh rock.vdb --uniform -o rock.stl");
     verb->add_option("solid", args->solid.path, "Level set to mesh (.vdb, or a mesh to remesh)")
         ->required();
     verb->add_option("-o,--output", args->out, "Where to write it (.obj .ply .stl .off .glb)")

@@ -44,7 +44,8 @@ std::vector<TriMesh> meshes_of(const RenderArgs& args, const Console& console) {
 void run(RenderArgs& args, const Console& console) {
     console.may_write(args.out);
     if (args.out.extension() != ".png" && args.out.extension() != ".exr")
-        throw Error(Fault::unsupported, args.out.string() + ": not a picture format; use .png or .exr");
+        throw Error(Fault::unsupported,
+                    args.out.string() + ": not a picture format; use .png or .exr");
     if (!args.size.empty())
         parse_picture_size(args.size, args.settings);
     args.settings.ground = !args.no_ground;
@@ -72,7 +73,8 @@ void add_render(CLI::App& app, Console& console) {
     verb->add_option("-o,--output", args->out, "Picture to write (.png, or .exr in linear light)")
         ->required();
     verb->add_option("--size", args->size, "Of the picture, or of one panel [480x640 pixels]");
-    verb->add_option("--turntable", s.turntable_deg, "Turn about +Y, counter-clockwise from above [deg]")
+    verb->add_option("--turntable", s.turntable_deg,
+                     "Turn about +Y, counter-clockwise from above [deg]")
         ->check(CLI::Range(-3600.0, 3600.0))
         ->capture_default_str();
     verb->add_option("--elevation", s.elevation_deg, "Of the eye above the horizon, -89..89 [deg]")

@@ -18,7 +18,8 @@ struct SampleArgs {
 /// Holes inside a solid, or in a box that stands on the origin's corner.
 LawHoles sample(const SampleArgs& args, const Console& console) {
     if (args.box.empty() == args.solid.path.empty())
-        throw Error(Fault::bad_argument, "sample: say where the holes go: --in SOLID or --box X,Y,Z");
+        throw Error(Fault::bad_argument,
+                    "sample: say where the holes go: --in SOLID or --box X,Y,Z");
     if (!args.box.empty()) {
         const Box box{{0, 0, 0}, parse_size("--box", args.box)};
         return place_law(args.law, args.placement, {0, box.longest()},

@@ -37,11 +37,13 @@ void run(ShapeArgs& args, const Console& console) {
         report_stage(console.progress, "rasterizing");
         const auto grid = rasterize(*shape_field(args.settings), lattice, console.progress);
         json.update(write_solid(args.out, *grid,
-                                format_recipe(node, lattice.voxel_m, args.settings.seed), {}, console));
+                                format_recipe(node, lattice.voxel_m, args.settings.seed), {},
+                                console));
     } else {
         if (args.dim || !args.voxel.empty())
-            throw Error(Fault::bad_argument, "shape: --dim and --voxel are for a .vdb; a mesh takes "
-                                             "--subdivisions");
+            throw Error(Fault::bad_argument,
+                        "shape: --dim and --voxel are for a .vdb; a mesh takes "
+                        "--subdivisions");
         const MeshFormat format = *mesh_format(args.out);
         write_file(args.out, format_mesh(mesh, format, format_recipe(node, 0, args.settings.seed)));
         json["triangles"] = mesh.triangles.size();
@@ -56,11 +58,10 @@ void run(ShapeArgs& args, const Console& console) {
 
 void add_shape(CLI::App& app, Console& console) {
     auto args = std::make_shared<ShapeArgs>();
-    auto* verb = console.verb(
-        app, "shape", "Make a base shape as a level set or a mesh",
-        "  taihu shape boulder --size 0.7,1,0.6 --seed 7 -o base.ply\n"
-        "  taihu shape torus --size 1m --tube 30cm --dim 200 -o ring.vdb\n"
-        "  taihu shape icosphere --subdivisions 4 -o ball.obj");
+    auto* verb = console.verb(app, "shape", "Make a base shape as a level set or a mesh",
+                              "  taihu shape boulder --size 0.7,1,0.6 --seed 7 -o base.ply\n"
+                              "  taihu shape torus --size 1m --tube 30cm --dim 200 -o ring.vdb\n"
+                              "  taihu shape icosphere --subdivisions 4 -o ball.obj");
     ShapeSettings& s = args->settings;
     verb->add_option("kind", args->kind,
                      "sphere, ellipsoid, box, cylinder, torus, icosphere or boulder")

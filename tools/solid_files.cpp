@@ -27,7 +27,9 @@ double longest_m(const openvdb::FloatGrid& grid) {
 
 } // namespace
 
-bool is_vdb(const std::filesystem::path& path) { return path.extension() == ".vdb"; }
+bool is_vdb(const std::filesystem::path& path) {
+    return path.extension() == ".vdb";
+}
 
 void check_solid_path(const std::filesystem::path& path) {
     if (!is_vdb(path) && !mesh_format(path))
@@ -46,9 +48,9 @@ void SolidOptions::add_mesh_options(CLI::App& verb) {
 }
 
 void SolidOptions::add_voxel_options(CLI::App& verb) {
-    auto* by_dim = verb.add_option("--dim", dim,
-                                   "A mesh: voxels along its longest axis, 4..65536 [256]")
-                       ->check(CLI::Range(4, 65536));
+    auto* by_dim =
+        verb.add_option("--dim", dim, "A mesh: voxels along its longest axis, 4..65536 [256]")
+            ->check(CLI::Range(4, 65536));
     verb.add_option("--voxel", voxel, "or the size of a voxel, as 5mm")->excludes(by_dim);
     verb.add_option("--close", close, "An open mesh: cap its boundary loops, or refuse it")
         ->check(CLI::IsMember({"loops", "none"}))
@@ -86,16 +88,16 @@ Solid read_solid(const SolidOptions& options, const Console& console) {
         solid.grid = result.solid;
         solid.found = result.diagnosis.lines();
         if (file.n_polygons > 0)
-            solid.found.push_back(fmt::format("{} polygons of more than three corners split",
-                                              file.n_polygons));
+            solid.found.push_back(
+                fmt::format("{} polygons of more than three corners split", file.n_polygons));
         if (file.n_degenerate_faces > 0)
             solid.found.push_back(fmt::format("{} faces without three different corners left out",
                                               file.n_degenerate_faces));
         if (file.levels.size() > 1)
             solid.found.push_back(fmt::format("the finest of {} levels taken", file.levels.size()));
         console.say_all(where, solid.found);
-        solid.node = mesh_node(name, sha256_hex(read_file(options.path)), options.unit_m,
-                                options.up == "z");
+        solid.node =
+            mesh_node(name, sha256_hex(read_file(options.path)), options.unit_m, options.up == "z");
     }
     solid.measure = {lattice_of(*solid.grid).voxel_m, longest_m(*solid.grid)};
     return solid;
@@ -143,15 +145,16 @@ std::string certificate_line(const Certificate& c) {
             line += (line.empty() ? "" : ", ") + fault;
         return line;
     }
-    return fmt::format("closed 2-manifold, outward: {} triangles, {} piece{}, genus {}, {:.4g} m^3, {} "
-                       "self-intersection{}",
-                       c.n_triangles, c.n_components, c.n_components == 1 ? "" : "s", c.genus,
-                       c.volume_m3, c.n_self_intersections, c.n_self_intersections == 1 ? "" : "s");
+    return fmt::format(
+        "closed 2-manifold, outward: {} triangles, {} piece{}, genus {}, {:.4g} m^3, {} "
+        "self-intersection{}",
+        c.n_triangles, c.n_components, c.n_components == 1 ? "" : "s", c.genus, c.volume_m3,
+        c.n_self_intersections, c.n_self_intersections == 1 ? "" : "s");
 }
 
-nlohmann::ordered_json write_solid(const std::filesystem::path& path, const openvdb::FloatGrid& grid,
-                                   const std::string& recipe, const SurfaceOptions& surface,
-                                   const Console& console) {
+nlohmann::ordered_json write_solid(const std::filesystem::path& path,
+                                   const openvdb::FloatGrid& grid, const std::string& recipe,
+                                   const SurfaceOptions& surface, const Console& console) {
     console.may_write(path);
     const Measure measure{lattice_of(grid).voxel_m, longest_m(grid)};
     nlohmann::ordered_json json = {{"file", path.string()}};

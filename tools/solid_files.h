@@ -18,21 +18,21 @@ namespace taihu {
 /// The options by which a verb takes a solid: a level set, or a mesh that becomes one.
 struct SolidOptions {
     std::filesystem::path path;
-    std::optional<int> dim;     ///< voxels along the longest axis
-    std::string voxel;          ///< or their size
+    std::optional<int> dim; ///< voxels along the longest axis
+    std::string voxel;      ///< or their size
     std::string close = "loops";
     double unit_m = 1;
     std::string up = "y";
 
-    void add_mesh_options(CLI::App& verb); ///< --unit, --up
+    void add_mesh_options(CLI::App& verb);  ///< --unit, --up
     void add_voxel_options(CLI::App& verb); ///< --dim, --voxel, --close, and the two above
     MeshReadSettings mesh_settings() const;
 };
 
 struct Solid {
     openvdb::FloatGrid::Ptr grid;
-    Measure measure;            ///< its voxel, its longest axis
-    std::string node;           ///< its place in a recipe
+    Measure measure;                ///< its voxel, its longest axis
+    std::string node;               ///< its place in a recipe
     std::vector<std::string> found; ///< what was repaired in a mesh
 };
 
@@ -49,11 +49,11 @@ struct SurfaceOptions {
     SurfaceSettings settings(const Measure& measure) const;
 };
 
-/// Write a solid as the extension of `path` says: .vdb, or a certified mesh. Returns the keys of the
-/// verb's JSON result: file, bytes, and for a mesh its certificate.
-nlohmann::ordered_json write_solid(const std::filesystem::path& path, const openvdb::FloatGrid& grid,
-                                   const std::string& recipe, const SurfaceOptions& surface,
-                                   const Console& console);
+/// Write a solid as the extension of `path` says: .vdb, or a certified mesh. Returns the keys of
+/// the verb's JSON result: file, bytes, and for a mesh its certificate.
+nlohmann::ordered_json write_solid(const std::filesystem::path& path,
+                                   const openvdb::FloatGrid& grid, const std::string& recipe,
+                                   const SurfaceOptions& surface, const Console& console);
 
 nlohmann::ordered_json certificate_json(const Certificate& certificate);
 /// `closed 2-manifold, outward: 1 piece, genus 12, 0.41 m^3, 0 self-intersections`.

@@ -12,7 +12,8 @@ namespace taihu {
 
 Length parse_length(const std::string& option, const std::string& text) {
     std::size_t end = text.size();
-    while (end > 0 && (std::isalpha(static_cast<unsigned char>(text[end - 1])) || text[end - 1] == '%'))
+    while (end > 0 &&
+           (std::isalpha(static_cast<unsigned char>(text[end - 1])) || text[end - 1] == '%'))
         --end;
     const auto value = parse_number(std::string_view(text).substr(0, end));
     const std::string_view unit = std::string_view(text).substr(end);
@@ -36,9 +37,10 @@ double in_metres(const std::string& option, const Length& length, const Measure&
                        : length.unit == Length::Unit::voxel ? of.voxel_m
                                                             : of.longest_m / 100;
     if (!(one > 0))
-        throw Error(Fault::bad_argument, option + ": a length in " +
-                                             (length.unit == Length::Unit::voxel ? "voxels" : "percent") +
-                                             " has nothing to refer to here; give it in metres");
+        throw Error(Fault::bad_argument,
+                    option + ": a length in " +
+                        (length.unit == Length::Unit::voxel ? "voxels" : "percent") +
+                        " has nothing to refer to here; give it in metres");
     return length.value * one;
 }
 

@@ -91,11 +91,11 @@ double torus_distance(const Vec3& p, double ring_m, double tube_m) {
 }
 
 double ellipsoid_distance(const Vec3& p, const Vec3& semi_axes) {
-    // Nearest point y_i = a_i^2 p_i / (t + a_i^2) with sum (a_i p_i / (t + a_i^2))^2 = 1; the sum falls
-    // as t grows from -min(a)^2, where the nearest point is on the surface's own side.
+    // Nearest point y_i = a_i^2 p_i / (t + a_i^2) with sum (a_i p_i / (t + a_i^2))^2 = 1; the sum
+    // falls as t grows from -min(a)^2, where the nearest point is on the surface's own side.
     const double shortest = std::min({semi_axes.x, semi_axes.y, semi_axes.z});
-    Vec3 a = semi_axes / shortest, q{std::fabs(p.x) / shortest, std::fabs(p.y) / shortest,
-                                     std::fabs(p.z) / shortest};
+    Vec3 a = semi_axes / shortest,
+         q{std::fabs(p.x) / shortest, std::fabs(p.y) / shortest, std::fabs(p.z) / shortest};
     const auto sum = [&](double t) {
         double s = 0;
         for (int i = 0; i < 3; ++i) {
@@ -109,8 +109,8 @@ double ellipsoid_distance(const Vec3& p, const Vec3& semi_axes) {
         level += (q[i] / a[i]) * (q[i] / a[i]);
     const double side = level < 1 ? -1 : 1;
     double lo = -1 + 1e-15, hi = std::max({a.x, a.y, a.z}) * length(q) + 1;
-    // In the plane of the shortest axis' middle the multiplier reaches -1: the nearest point leaves that
-    // plane, and its height there follows from the surface equation.
+    // In the plane of the shortest axis' middle the multiplier reaches -1: the nearest point leaves
+    // that plane, and its height there follows from the surface equation.
     const bool degenerate = sum(lo) < 1;
     for (int i = 0; i < 200 && !degenerate; ++i) {
         const double middle = 0.5 * (lo + hi);

@@ -83,9 +83,10 @@ private:
     static constexpr std::size_t kLeaves = std::size_t{kAcross} * kAcross * kAcross;
 
     std::size_t index(const Coord& leaf) const {
-        return static_cast<std::size_t>(((leaf.x() - block_.x()) / kLeaf * kAcross +
-                                         (leaf.y() - block_.y()) / kLeaf) * kAcross +
-                                        (leaf.z() - block_.z()) / kLeaf);
+        return static_cast<std::size_t>(
+            ((leaf.x() - block_.x()) / kLeaf * kAcross + (leaf.y() - block_.y()) / kLeaf) *
+                kAcross +
+            (leaf.z() - block_.z()) / kLeaf);
     }
     Coord origin(std::size_t leaf) const {
         const int i = static_cast<int>(leaf);
@@ -101,13 +102,13 @@ private:
             for (int axis = 0; axis < 3; ++axis) {
                 const double c = ball.center[axis] - block_[axis], reach = ball.r + half_width_;
                 lo[axis] = static_cast<int>(std::max(0.0, std::floor((c - reach) / kLeaf)));
-                hi[axis] = static_cast<int>(std::min(kAcross - 1.0, std::floor((c + reach) / kLeaf)));
+                hi[axis] =
+                    static_cast<int>(std::min(kAcross - 1.0, std::floor((c + reach) / kLeaf)));
             }
             for (int i = lo[0]; i <= hi[0]; ++i)
                 for (int j = lo[1]; j <= hi[1]; ++j)
                     for (int k = lo[2]; k <= hi[2]; ++k) {
-                        const auto leaf =
-                            static_cast<std::size_t>((i * kAcross + j) * kAcross + k);
+                        const auto leaf = static_cast<std::size_t>((i * kAcross + j) * kAcross + k);
                         if (inside_[leaf])
                             continue;
                         const Cover cover = classify(ball, origin(leaf), kLeaf, half_width_);
@@ -134,8 +135,8 @@ public:
         balls_.reserve(balls.size());
         Box box;
         for (const Sphere& s : balls) {
-            balls_.push_back({(s.center - lattice.origin) / lattice.voxel_m,
-                              s.radius_m / lattice.voxel_m});
+            balls_.push_back(
+                {(s.center - lattice.origin) / lattice.voxel_m, s.radius_m / lattice.voxel_m});
             const double reach = balls_.back().r + half_width_;
             box.include(balls_.back().center - Vec3{reach, reach, reach});
             box.include(balls_.back().center + Vec3{reach, reach, reach});
@@ -221,8 +222,7 @@ BallsField::BallsField(std::span<const Sphere> balls) : balls_(balls.begin(), ba
             throw Error(Fault::bad_argument, where + ".radius_m is " + std::to_string(s.radius_m) +
                                                  ", must be finite and > 0; drop or fix the hole");
         if (!is_finite(s.center))
-            throw Error(Fault::bad_argument,
-                        where + ".center is not finite; drop or fix the hole");
+            throw Error(Fault::bad_argument, where + ".center is not finite; drop or fix the hole");
     }
 }
 

@@ -11,7 +11,8 @@ namespace taihu {
 /// Opening a block costs the balls that meet it; a leaf inside one ball is never evaluated.
 class BallsField final : public Field {
 public:
-    /// \throws Error bad_argument: `holes[i]` with a radius not finite and > 0, or a centre not finite.
+    /// \throws Error bad_argument: `holes[i]` with a radius not finite and > 0, or a centre not
+    /// finite.
     explicit BallsField(std::span<const Sphere> balls);
     std::unique_ptr<LatticeField> on(const Lattice& lattice) const override;
 

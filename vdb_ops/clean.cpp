@@ -37,7 +37,8 @@ Choice choose(const std::vector<Components::Part>& parts, const CleanSettings& s
             ++choice.counts.n_bubbles;
     }
     if (solids.empty())
-        throw Error(Fault::bad_input, "clean: nothing is left of the solid; use fewer or smaller holes");
+        throw Error(Fault::bad_input,
+                    "clean: nothing is left of the solid; use fewer or smaller holes");
     std::sort(solids.begin(), solids.end(), [&](std::size_t a, std::size_t b) {
         return parts[a].n_voxels != parts[b].n_voxels ? parts[a].n_voxels > parts[b].n_voxels
                                                       : parts[a].first < parts[b].first;
@@ -75,9 +76,11 @@ public:
     bool flipped(int x, int y, int z) const {
         return flipped_[index(x + reach_, y + reach_, z + reach_)] != 0;
     }
-    /// Distance [voxels] from a voxel of the leaf to the nearest place where a grid edge crosses the
-    /// surface that stays, or the one that goes; at most `far`.
-    float to_staying(int x, int y, int z, float far) const { return nearest(staying_, x, y, z, far); }
+    /// Distance [voxels] from a voxel of the leaf to the nearest place where a grid edge crosses
+    /// the surface that stays, or the one that goes; at most `far`.
+    float to_staying(int x, int y, int z, float far) const {
+        return nearest(staying_, x, y, z, far);
+    }
     float to_going(int x, int y, int z, float far) const { return nearest(going_, x, y, z, far); }
 
 private:
@@ -132,7 +135,8 @@ void rebuild_leaf(Leaf& leaf, const Neighbourhood& near, float half_width, float
         const bool flipped = near.flipped(x, y, z);
         if (!flipped && std::fabs(old) >= background)
             continue;
-        // Looked for a voxel beyond the band: crossings of edges are a little farther than the surface.
+        // Looked for a voxel beyond the band: crossings of edges are a little farther than the
+        // surface.
         const float d = near.to_staying(x, y, z, half_width + 1);
         // The nearest surface stays: its exact distance is better than the one rebuilt.
         if (!flipped && near.to_going(x, y, z, half_width + 1) >= d)
@@ -157,7 +161,8 @@ openvdb::FloatGrid::Ptr flip_parts(const openvdb::FloatGrid& grid, const Compone
         const Neighbourhood near(accessor, components, flips, old[i]->origin(),
                                  static_cast<int>(std::ceil(lattice.half_width_vox)) + 2);
         if (near.any_flipped())
-            rebuild_leaf(*leaves[i], near, lattice.half_width_vox, static_cast<float>(lattice.voxel_m));
+            rebuild_leaf(*leaves[i], near, lattice.half_width_vox,
+                         static_cast<float>(lattice.voxel_m));
     });
     auto result = openvdb::FloatGrid::create(grid.background());
     result->setTransform(grid.transform().copy());
@@ -177,7 +182,8 @@ CleanResult clean(const openvdb::FloatGrid& solid, const CleanSettings& settings
                   Progress* progress) {
     lattice_of(solid);
     if (solid.tree().leafCount() == 0)
-        throw Error(Fault::bad_input, "clean: nothing is left of the solid; use fewer or smaller holes");
+        throw Error(Fault::bad_input,
+                    "clean: nothing is left of the solid; use fewer or smaller holes");
     CleanResult result;
     openvdb::FloatGrid::Ptr grid;
     {
@@ -191,7 +197,8 @@ CleanResult clean(const openvdb::FloatGrid& solid, const CleanSettings& settings
     const double before = volume_m3(solid), without_pieces = volume_m3(*grid);
     result.removed_m3 = before - without_pieces;
     if (settings.fill_bubbles) {
-        // After the pieces: a bubble inside a removed piece went with it, one around it is whole now.
+        // After the pieces: a bubble inside a removed piece went with it, one around it is whole
+        // now.
         const Components components(*grid);
         std::vector<char> flips(components.parts().size(), 0);
         for (std::size_t p = 0; p < flips.size(); ++p)

@@ -9,25 +9,26 @@
 namespace taihu {
 
 struct CleanSettings {
-    std::optional<std::size_t> n_pieces = 1; ///< keep this many of the largest solids; all when absent
-    bool fill_bubbles = true;                ///< fill voids that no way leads to from outside
+    std::optional<std::size_t> n_pieces =
+        1;                    ///< keep this many of the largest solids; all when absent
+    bool fill_bubbles = true; ///< fill voids that no way leads to from outside
 };
 
 struct CleanResult {
     openvdb::FloatGrid::Ptr solid; ///< a new grid on the same lattice
     std::size_t n_pieces = 0;      ///< found
     std::size_t n_pieces_removed = 0;
-    std::size_t n_bubbles = 0;     ///< found
+    std::size_t n_bubbles = 0; ///< found
     std::size_t n_bubbles_filled = 0;
-    double removed_m3 = 0;         ///< volume of the pieces that went
-    double filled_m3 = 0;          ///< volume of the bubbles that were filled
+    double removed_m3 = 0; ///< volume of the pieces that went
+    double filled_m3 = 0;  ///< volume of the bubbles that were filled
 };
 
-/// Loose fragments away and sealed bubbles shut. Solid and void voxels connect over faces; the largest
-/// piece is the one of most voxels, at ties the first in x, y, z order. Distances near what went are
-/// rebuilt from the surface that stays (within 0.2 voxel there, unchanged elsewhere).
-/// The same bits on any number of threads. O(leaves), plus 1 KiB a leaf.
-/// \throws Error bad_argument as lattice_of(); bad_input: nothing solid is there, or the box of the solid
+/// Loose fragments away and sealed bubbles shut. Solid and void voxels connect over faces; the
+/// largest piece is the one of most voxels, at ties the first in x, y, z order. Distances near what
+/// went are rebuilt from the surface that stays (within 0.2 voxel there, unchanged elsewhere). The
+/// same bits on any number of threads. O(leaves), plus 1 KiB a leaf. \throws Error bad_argument as
+/// lattice_of(); bad_input: nothing solid is there, or the box of the solid
 ///   holds more than 2^31 leaves.
 CleanResult clean(const openvdb::FloatGrid& solid, const CleanSettings& settings = {},
                   Progress* progress = nullptr);

@@ -145,7 +145,8 @@ std::vector<Half> sorted_halves(const std::vector<Triangle>& faces, std::size_t 
 template <class Fn>
 void each_edge(const std::vector<Half>& halves, Fn&& fn) {
     for (std::size_t i = 0, j = 0; i < halves.size(); i = j) {
-        while (j < halves.size() && halves[j].low == halves[i].low && halves[j].high == halves[i].high)
+        while (j < halves.size() && halves[j].low == halves[i].low &&
+               halves[j].high == halves[i].high)
             ++j;
         fn(halves.data() + i, halves.data() + j);
     }
@@ -194,21 +195,22 @@ private:
     void drop_duplicates() {
         std::vector<char> keep(faces_.size(), 1); // 2: kept only if every face is given twice
         MeshDiagnosis& d = out_.diagnosis;
-        each_edge(sorted_halves(faces_, out_.positions.size()), [&](const Half* begin, const Half* end) {
-            for (const Half* a = begin; a != end; ++a)
-                for (const Half* b = a + 1; b != end && keep[a->face] == 1; ++b) {
-                    if (keep[b->face] != 1 ||
-                        third_vertex(faces_[a->face], *a) != third_vertex(faces_[b->face], *b))
-                        continue;
-                    keep[b->face] = 0;
-                    if (a->direction == b->direction) {
-                        ++d.n_duplicate;
-                    } else { // front and back
-                        ++d.n_opposite_pairs;
-                        keep[a->face] = 2;
-                    }
-                }
-        });
+        each_edge(sorted_halves(faces_, out_.positions.size()),
+                  [&](const Half* begin, const Half* end) {
+                      for (const Half* a = begin; a != end; ++a)
+                          for (const Half* b = a + 1; b != end && keep[a->face] == 1; ++b) {
+                              if (keep[b->face] != 1 || third_vertex(faces_[a->face], *a) !=
+                                                            third_vertex(faces_[b->face], *b))
+                                  continue;
+                              keep[b->face] = 0;
+                              if (a->direction == b->direction) {
+                                  ++d.n_duplicate;
+                              } else { // front and back
+                                  ++d.n_opposite_pairs;
+                                  keep[a->face] = 2;
+                              }
+                          }
+                  });
         if (d.n_duplicate + d.n_opposite_pairs == 0)
             return;
         // A pair here and there is a wall without thickness: both sides go.
@@ -224,16 +226,17 @@ private:
     void orient() {
         MeshDiagnosis& d = out_.diagnosis;
         ParityUnion sides(faces_.size());
-        each_edge(sorted_halves(faces_, out_.positions.size()), [&](const Half* a, const Half* end) {
-            const auto n = end - a;
-            d.n_open_edges += n == 1;
-            d.n_nonmanifold_edges += n > 2;
-            if (n != 2)
-                return;
-            const bool flipped = a[0].direction == a[1].direction;
-            d.n_flipped_edges += flipped;
-            d.n_one_sided += !sides.join(a[0].face, a[1].face, flipped);
-        });
+        each_edge(sorted_halves(faces_, out_.positions.size()),
+                  [&](const Half* a, const Half* end) {
+                      const auto n = end - a;
+                      d.n_open_edges += n == 1;
+                      d.n_nonmanifold_edges += n > 2;
+                      if (n != 2)
+                          return;
+                      const bool flipped = a[0].direction == a[1].direction;
+                      d.n_flipped_edges += flipped;
+                      d.n_one_sided += !sides.join(a[0].face, a[1].face, flipped);
+                  });
         if (d.n_flipped_edges == 0)
             return;
         std::vector<std::int64_t> votes(faces_.size(), 0);
@@ -321,7 +324,8 @@ private:
         CappedLoop info;
         info.n_edges = loop.size();
         for (std::size_t k = 0; k < loop.size(); ++k) {
-            const Vec3 &p = out_.positions[loop[k]], &q = out_.positions[loop[(k + 1) % loop.size()]];
+            const Vec3 &p = out_.positions[loop[k]],
+                       &q = out_.positions[loop[(k + 1) % loop.size()]];
             const double l = length(q - p);
             info.center += (p + q) * (0.5 * l);
             info.perimeter_m += l;
@@ -389,7 +393,8 @@ private:
             for (Index j = 0; j < out_.shells.size(); ++j) {
                 Shell& inner = out_.shells[i];
                 const Shell& outer = out_.shells[j];
-                if (i == j || inner.role != Shell::Role::solid || outer.role == Shell::Role::sheet ||
+                if (i == j || inner.role != Shell::Role::solid ||
+                    outer.role == Shell::Role::sheet ||
                     (inner.volume_m3 < 0) == (outer.volume_m3 < 0) ||
                     std::fabs(inner.volume_m3) >= std::fabs(outer.volume_m3) ||
                     !outer.box.contains(inner.box.lo) || !outer.box.contains(inner.box.hi))
@@ -417,9 +422,8 @@ private:
         for (Index f = 0; f < faces_.size(); ++f)
             if (out_.shells[out_.shell_of[f]].role != Shell::Role::sheet)
                 order.push_back(f);
-        std::stable_sort(order.begin(), order.end(), [&](Index a, Index b) {
-            return out_.shell_of[a] < out_.shell_of[b];
-        });
+        std::stable_sort(order.begin(), order.end(),
+                         [&](Index a, Index b) { return out_.shell_of[a] < out_.shell_of[b]; });
         std::vector<Index> shell_of;
         for (const Index f : order) {
             out_.triangles.push_back(faces_[f]);
@@ -458,7 +462,8 @@ ClosedMesh close_mesh(const TriMesh& mesh, const std::string& where, CloseRule r
     }
     if (d.n_solids == 0) {
         char share[32];
-        std::snprintf(share, sizeof share, "%.0f", d.area_m2 > 0 ? 100 * d.cap_area_m2 / d.area_m2 : 0);
+        std::snprintf(share, sizeof share, "%.0f",
+                      d.area_m2 > 0 ? 100 * d.cap_area_m2 / d.area_m2 : 0);
         throw Error(Fault::bad_input,
                     where + ": no inside: " + std::to_string(d.n_sheets) +
                         " sheets without one (caps would be " + share +
@@ -487,12 +492,13 @@ std::vector<std::string> MeshDiagnosis::lines() const {
         say("%zu walls without thickness (a face and its back) dropped", n_opposite_pairs);
     if (!loops.empty()) {
         const double share = 100 * cap_area_m2 / area_m2;
-        say("open: %zu edges in %zu loops, closed with caps = %.2g %% of the surface%s", n_open_edges,
-            loops.size(), share, share > 10 ? " (doubtful)" : "");
+        say("open: %zu edges in %zu loops, closed with caps = %.2g %% of the surface%s",
+            n_open_edges, loops.size(), share, share > 10 ? " (doubtful)" : "");
         constexpr std::size_t kNamed = 8;
         for (std::size_t i = 0; i < std::min(loops.size(), kNamed); ++i)
-            say("  loop %zu: %zu edges, %.4g m around, at (%.4g, %.4g, %.4g)", i + 1, loops[i].n_edges,
-                loops[i].perimeter_m, loops[i].center.x, loops[i].center.y, loops[i].center.z);
+            say("  loop %zu: %zu edges, %.4g m around, at (%.4g, %.4g, %.4g)", i + 1,
+                loops[i].n_edges, loops[i].perimeter_m, loops[i].center.x, loops[i].center.y,
+                loops[i].center.z);
         if (loops.size() > kNamed)
             say("  and %zu more", loops.size() - kNamed);
     }

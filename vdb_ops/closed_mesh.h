@@ -17,7 +17,7 @@ enum class CloseRule {
 /// A boundary loop that was capped.
 struct CappedLoop {
     std::size_t n_edges = 0;
-    Vec3 center;           ///< mean of its edges, weighted by length [m]
+    Vec3 center; ///< mean of its edges, weighted by length [m]
     double perimeter_m = 0;
 };
 
@@ -49,9 +49,9 @@ struct MeshDiagnosis {
     std::size_t n_flipped_edges = 0;     ///< neighbours that disagreed on the side: made consistent
     std::size_t n_one_sided = 0;         ///< edges where that cannot be done (Moebius)
     std::size_t n_solids = 0, n_cavities = 0, n_sheets = 0;
-    std::size_t n_inverted = 0;          ///< solids whose faces pointed inwards
+    std::size_t n_inverted = 0; ///< solids whose faces pointed inwards
     double sheet_area_m2 = 0, area_m2 = 0, cap_area_m2 = 0;
-    double weld_tolerance_m = 0;         ///< 0: only equal positions were welded
+    double weld_tolerance_m = 0; ///< 0: only equal positions were welded
     std::vector<CappedLoop> loops;
 
     /// One line for each thing that a user should know; empty for a clean closed mesh.
@@ -68,11 +68,11 @@ struct ClosedMesh {
 };
 
 /// Make a solid of any triangle mesh, or refuse it by name: weld equal positions, drop duplicates,
-/// turn neighbours to one side, split into shells, cap boundary loops, leave sheets out. When nothing
-/// has an inside, cracks are welded at 1e-6, 1e-5 and 1e-4 of the diagonal.
-/// Serial but for sorting; O(n log n), loops O(length^2) in the worst case.
-/// \param where  stands for the mesh in messages.
-/// \throws Error bad_input: no face at all, open edges under CloseRule::none, or no shell with an
+/// turn neighbours to one side, split into shells, cap boundary loops, leave sheets out. When
+/// nothing has an inside, cracks are welded at 1e-6, 1e-5 and 1e-4 of the diagonal. Serial but for
+/// sorting; O(n log n), loops O(length^2) in the worst case. \param where  stands for the mesh in
+/// messages. \throws Error bad_input: no face at all, open edges under CloseRule::none, or no shell
+/// with an
 ///   inside (a sheet: caps above 45 % of its area, or no volume).
 ClosedMesh close_mesh(const TriMesh& mesh, const std::string& where,
                       CloseRule rule = CloseRule::loops, Progress* progress = nullptr);

@@ -39,7 +39,8 @@ void each_crossing(const std::array<Vec3, 3>& p, const Triangle& id, Fn&& fn) {
         }
         if (n < 2)
             continue;
-        const Cut &left = cut[cut[0].x <= cut[1].x ? 0 : 1], &right = cut[cut[0].x <= cut[1].x ? 1 : 0];
+        const Cut &left = cut[cut[0].x <= cut[1].x ? 0 : 1],
+                  &right = cut[cut[0].x <= cut[1].x ? 1 : 0];
         const double slope = right.x > left.x ? (right.z - left.z) / (right.x - left.x) : 0;
         const int x1 = static_cast<int>(std::ceil(right.x)) - 1;
         for (int x = static_cast<int>(std::ceil(left.x)); x <= x1; ++x)
@@ -61,8 +62,8 @@ Columns::Columns(const ClosedMesh& mesh, const std::vector<Vec3>& points,
                     const Triangle& t = mesh.triangles[i];
                     each_crossing({points[t[0]], points[t[1]], points[t[2]]}, t,
                                   [&](int x, int y, double z, int sign) {
-                                      fn(column(x, y), Hit{static_cast<std::int32_t>(std::ceil(z)), sign,
-                                                           mesh.shell_of[i]});
+                                      fn(column(x, y), Hit{static_cast<std::int32_t>(std::ceil(z)),
+                                                           sign, mesh.shell_of[i]});
                                   });
                 }
             });
@@ -96,8 +97,8 @@ void Columns::find_overlaps(const ClosedMesh& mesh) {
             if (i == first_[c] || hits_[i - 1].shell != hit.shell)
                 winding = 0;
             winding += mesh.shells[hit.shell].volume_m3 < 0 ? -hit.sign : hit.sign;
-            const bool last_here =
-                i + 1 == first_[c + 1] || hits_[i + 1].shell != hit.shell || hits_[i + 1].z != hit.z;
+            const bool last_here = i + 1 == first_[c + 1] || hits_[i + 1].shell != hit.shell ||
+                                   hits_[i + 1].z != hit.z;
             if (last_here && (winding > 1 || winding < 0))
                 overlaps_[hit.shell] = 1;
         }

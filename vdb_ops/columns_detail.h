@@ -10,9 +10,9 @@
 namespace taihu {
 
 /// Where the grid columns along z pass through the faces of a closed mesh, in voxel coordinates.
-/// A column's 2D test looks at edges alone (exact comparisons in y, one rounding in x that both faces of
-/// an edge share), so over balanced faces the signed count is exactly 0 above and below, whatever the
-/// geometry; rounding can only shift a crossing along z, onto the same face.
+/// A column's 2D test looks at edges alone (exact comparisons in y, one rounding in x that both
+/// faces of an edge share), so over balanced faces the signed count is exactly 0 above and below,
+/// whatever the geometry; rounding can only shift a crossing along z, onto the same face.
 class Columns {
 public:
     struct Hit {
@@ -21,7 +21,8 @@ public:
         std::uint32_t shell;
     };
 
-    /// \param points  voxel coordinates of mesh.positions; \param box  columns outside it are empty.
+    /// \param points  voxel coordinates of mesh.positions; \param box  columns outside it are
+    /// empty.
     Columns(const ClosedMesh& mesh, const std::vector<Vec3>& points, const openvdb::CoordBBox& box);
 
     /// The hits of column (x, y), sorted by shell, then z.

@@ -24,7 +24,8 @@ Components::Components(const openvdb::FloatGrid& grid) {
     // A margin on each side: the outside is one piece there, and neighbours may look that far.
     const Coord margin(kMargin);
     lo_ = Coord(box.min().x() >> 3, box.min().y() >> 3, box.min().z() >> 3) - margin;
-    n_ = Coord(box.max().x() >> 3, box.max().y() >> 3, box.max().z() >> 3) + margin - lo_ + Coord(1);
+    n_ =
+        Coord(box.max().x() >> 3, box.max().y() >> 3, box.max().z() >> 3) + margin - lo_ + Coord(1);
     const double n_blocks = double(n_.x()) * n_.y() * n_.z();
     if (n_blocks > double(kUniform))
         throw Error(Fault::bad_input, "clean: the box of the solid holds " +
@@ -42,8 +43,8 @@ Components::Components(const openvdb::FloatGrid& grid) {
         n += n_labels_[i];
         block_[block_index(leaves_[i]->origin())] = static_cast<std::uint32_t>(i);
     }
-    // Uniform blocks: inside ones each start a label; outside ones take the unbounded void's, or a label
-    // of their own when they may be a large bubble. Both join their neighbours below.
+    // Uniform blocks: inside ones each start a label; outside ones take the unbounded void's, or a
+    // label of their own when they may be a large bubble. Both join their neighbours below.
     auto accessor = grid.getConstAccessor();
     solid_.assign(n, 0);
     for (std::size_t i = 0; i < leaves_.size(); ++i)
@@ -69,7 +70,8 @@ Components::Components(const openvdb::FloatGrid& grid) {
 }
 
 std::size_t Components::block_index(const Coord& voxel) const {
-    return (static_cast<std::size_t>((voxel.x() >> 3) - lo_.x()) * static_cast<std::size_t>(n_.y()) +
+    return (static_cast<std::size_t>((voxel.x() >> 3) - lo_.x()) *
+                static_cast<std::size_t>(n_.y()) +
             static_cast<std::size_t>((voxel.y() >> 3) - lo_.y())) *
                static_cast<std::size_t>(n_.z()) +
            static_cast<std::size_t>((voxel.z() >> 3) - lo_.z());
@@ -114,12 +116,13 @@ std::uint32_t Components::label_at(std::size_t block, int voxel) const {
 }
 
 void Components::join_faces() {
-    const std::size_t strides[3] = {
-        static_cast<std::size_t>(n_.y()) * static_cast<std::size_t>(n_.z()),
-        static_cast<std::size_t>(n_.z()), 1};
+    const std::size_t strides[3] = {static_cast<std::size_t>(n_.y()) *
+                                        static_cast<std::size_t>(n_.z()),
+                                    static_cast<std::size_t>(n_.z()), 1};
     const int steps[3] = {64, 8, 1};
     for (std::size_t b = 0; b < block_.size(); ++b) {
-        const std::size_t at[3] = {b / strides[0], b / strides[1] % static_cast<std::size_t>(n_.y()),
+        const std::size_t at[3] = {b / strides[0],
+                                   b / strides[1] % static_cast<std::size_t>(n_.y()),
                                    b % static_cast<std::size_t>(n_.z())};
         for (int axis = 0; axis < 3; ++axis) {
             if (at[axis] + 1 >= static_cast<std::size_t>(n_[axis]))
@@ -129,7 +132,8 @@ void Components::join_faces() {
             const int s1 = steps[(axis + 1) % 3], s2 = steps[(axis + 2) % 3];
             for (int i = 0; i < (uniform ? 1 : 64); ++i) {
                 const int face = i / 8 * s1 + i % 8 * s2;
-                const std::uint32_t p = label_at(b, face + 7 * steps[axis]), q = label_at(next, face);
+                const std::uint32_t p = label_at(b, face + 7 * steps[axis]),
+                                    q = label_at(next, face);
                 if (solid_[p] == solid_[q])
                     join(p, q);
             }

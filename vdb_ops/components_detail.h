@@ -7,7 +7,8 @@
 
 namespace taihu {
 
-/// Face-connected pieces of the solid and of the void of a level set, over leaves and uniform blocks.
+/// Face-connected pieces of the solid and of the void of a level set, over leaves and uniform
+/// blocks.
 class Components {
 public:
     using Leaf = openvdb::FloatTree::LeafNodeType;
@@ -39,12 +40,12 @@ private:
     void join(std::uint32_t a, std::uint32_t b);
 
     std::vector<const Leaf*> leaves_;
-    openvdb::Coord lo_, n_;                          // blocks of 8^3 that the leaves' box covers, plus one
-    std::vector<std::uint32_t> block_;               // leaf number, or kUniform + label of the block
+    openvdb::Coord lo_, n_;            // blocks of 8^3 that the leaves' box covers, plus one
+    std::vector<std::uint32_t> block_; // leaf number, or kUniform + label of the block
     std::vector<std::array<std::uint16_t, 512>> labels_;
     std::vector<std::uint16_t> n_labels_;
     std::vector<std::uint32_t> first_label_, parent_, part_of_;
-    std::vector<char> solid_;                        // by label
+    std::vector<char> solid_; // by label
     std::vector<Part> parts_;
 };
 

@@ -9,9 +9,9 @@ namespace taihu {
 
 /// Where a field is sampled: voxel (i, j, k) lies at origin + voxel_m * (i, j, k).
 struct Lattice {
-    double voxel_m = 0;         ///< > 0
-    Vec3 origin;                ///< world position of voxel (0, 0, 0) [m]
-    float half_width_vox = 3;   ///< distances beyond this are clamped to it [voxels], 2..16
+    double voxel_m = 0;       ///< > 0
+    Vec3 origin;              ///< world position of voxel (0, 0, 0) [m]
+    float half_width_vox = 3; ///< distances beyond this are clamped to it [voxels], 2..16
 };
 
 /// What is known of a region without evaluating it: further than the half width from the surface on

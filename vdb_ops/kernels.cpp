@@ -89,7 +89,8 @@ void min_triangles(const LeafTriangle* all, const std::uint32_t* begin, const st
                     inside[z] = best[z] = 1e30f;
                 for (int k = 0; k < 3; ++k) {
                     const float s = side0[k] + t.en[k][0] * fx + t.en[k][1] * fy;
-                    const float u0 = (along0[k] + t.e[k][0] * fx + t.e[k][1] * fy) * t.inverse_e2[k];
+                    const float u0 =
+                        (along0[k] + t.e[k][0] * fx + t.e[k][1] * fy) * t.inverse_e2[k];
                     const float du = t.e[k][2] * t.inverse_e2[k];
                     const float px = q[k][0] + fx, py = q[k][1] + fy;
                     for (int z = 0; z < 8; ++z) {

@@ -21,8 +21,9 @@ struct LeafBall {
 /// values[512] = min(values, distance to the balls' union), for voxels within `half_width` of one.
 void min_balls(const LeafBall* balls, std::size_t n, float half_width, float* values);
 
-/// A triangle in voxel coordinates: corner a (double, so that errors do not grow with position), edges
-/// e[k] from corner k to k+1, unit normal n, in-plane edge normals en, 1 / |e|^2 (0 for no length).
+/// A triangle in voxel coordinates: corner a (double, so that errors do not grow with position),
+/// edges e[k] from corner k to k+1, unit normal n, in-plane edge normals en, 1 / |e|^2 (0 for no
+/// length).
 struct LeafTriangle {
     double a[3];
     float e[3][3], n[3], en[3][3], inverse_e2[3];
@@ -30,9 +31,9 @@ struct LeafTriangle {
     float lo[3], hi[3]; ///< box grown by the half width
 };
 
-/// squared[512] = min(squared, squared distance to the triangles), leaf at `origin`; rows farther than
-/// `half_width` from a triangle's box are skipped. With `winding` (one count per voxel) a voxel sees only
-/// faces that turn the right side to it: for shells that overlap themselves.
+/// squared[512] = min(squared, squared distance to the triangles), leaf at `origin`; rows farther
+/// than `half_width` from a triangle's box are skipped. With `winding` (one count per voxel) a
+/// voxel sees only faces that turn the right side to it: for shells that overlap themselves.
 void min_triangles(const LeafTriangle* all, const std::uint32_t* begin, const std::uint32_t* end,
                    const int* origin, float half_width, const std::int8_t* winding, float* squared);
 

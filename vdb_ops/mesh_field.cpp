@@ -53,11 +53,11 @@ LeafTriangle leaf_triangle(const std::array<Vec3, 3>& p, std::uint32_t shell, fl
     return t;
 }
 
-/// Calls fn(i, j, k) for the cells of `size` voxels, numbered from `first` over n cells each way, that may
-/// hold a voxel within the half width of the face: its box, and the slab round its plane.
+/// Calls fn(i, j, k) for the cells of `size` voxels, numbered from `first` over n cells each way,
+/// that may hold a voxel within the half width of the face: its box, and the slab round its plane.
 template <class Fn>
-void each_cell(const LeafTriangle& t, int size, const Coord& first, const Coord& n, float half_width,
-               Fn&& fn) {
+void each_cell(const LeafTriangle& t, int size, const Coord& first, const Coord& n,
+               float half_width, Fn&& fn) {
     int lo[3], hi[3];
     for (int c = 0; c < 3; ++c) {
         const double from = std::floor(std::ceil(t.lo[c]) / size) - first[c];
@@ -68,7 +68,9 @@ void each_cell(const LeafTriangle& t, int size, const Coord& first, const Coord&
     const double half = 0.5 * (size - 1);
     const double reach =
         half * (std::fabs(t.n[0]) + std::fabs(t.n[1]) + std::fabs(t.n[2])) + half_width + 1e-3;
-    const auto middle = [&](int c, int i) { return (first[c] + i) * static_cast<double>(size) + half - t.a[c]; };
+    const auto middle = [&](int c, int i) {
+        return (first[c] + i) * static_cast<double>(size) + half - t.a[c];
+    };
     for (int i = lo[0]; i <= hi[0]; ++i)
         for (int j = lo[1]; j <= hi[1]; ++j)
             for (int k = lo[2]; k <= hi[2]; ++k)
@@ -157,9 +159,10 @@ public:
 
 private:
     std::size_t index(const Coord& leaf) const {
-        return static_cast<std::size_t>(((leaf.x() - block_.x()) / kLeaf * kAcross +
-                                         (leaf.y() - block_.y()) / kLeaf) * kAcross +
-                                        (leaf.z() - block_.z()) / kLeaf);
+        return static_cast<std::size_t>(
+            ((leaf.x() - block_.x()) / kLeaf * kAcross + (leaf.y() - block_.y()) / kLeaf) *
+                kAcross +
+            (leaf.z() - block_.z()) / kLeaf);
     }
 
     void shell_distance(const Coord& leaf, std::uint32_t shell, const std::uint32_t* face,
@@ -169,10 +172,12 @@ private:
             for (int y = 0; y < kLeaf; ++y) {
                 const int cx = leaf.x() + x, cy = leaf.y() + y;
                 std::int8_t* row = winding + x * 64 + y * 8;
-                for (auto hit = data_.columns->begin(cx, cy); hit != data_.columns->end(cx, cy); ++hit)
-                    for (int z = std::max(0, hit->z - leaf.z()); hit->shell == shell && z < kLeaf; ++z)
-                        row[z] = static_cast<std::int8_t>(
-                            std::clamp(row[z] + hit->sign, -100, 100));
+                for (auto hit = data_.columns->begin(cx, cy); hit != data_.columns->end(cx, cy);
+                     ++hit)
+                    for (int z = std::max(0, hit->z - leaf.z()); hit->shell == shell && z < kLeaf;
+                         ++z)
+                        row[z] =
+                            static_cast<std::int8_t>(std::clamp(row[z] + hit->sign, -100, 100));
             }
         const float w = data_.half_width;
         std::fill(out, out + 512, w * w);
@@ -186,7 +191,8 @@ private:
 
     const LatticeMeshData& data_;
     Coord block_;
-    std::vector<std::uint32_t> first_, faces_; // faces of leaf i: faces_[first_[i] .. first_[i + 1])
+    std::vector<std::uint32_t> first_,
+        faces_; // faces of leaf i: faces_[first_[i] .. first_[i + 1])
 };
 
 class LatticeMesh final : public LatticeField {
@@ -232,11 +238,12 @@ private:
                 box.include(points[v]);
         const double reach = data_.half_width + 2;
         if (box.dilated(reach).lo.x < -0x1p30 || box.longest() > 0x1p22 ||
-            std::max({std::fabs(box.lo.x), std::fabs(box.lo.y), std::fabs(box.lo.z), box.hi.x, box.hi.y,
-                      box.hi.z}) > 0x1p29)
-            throw Error(Fault::bad_argument,
-                        "voxelize: the mesh would be more than 2^22 voxels long or 2^29 from the origin; "
-                        "use a larger voxel, or move it");
+            std::max({std::fabs(box.lo.x), std::fabs(box.lo.y), std::fabs(box.lo.z), box.hi.x,
+                      box.hi.y, box.hi.z}) > 0x1p29)
+            throw Error(
+                Fault::bad_argument,
+                "voxelize: the mesh would be more than 2^22 voxels long or 2^29 from the origin; "
+                "use a larger voxel, or move it");
         Coord lo, hi;
         for (int axis = 0; axis < 3; ++axis) {
             lo[axis] = static_cast<int>(std::floor(box.lo[axis] - reach)) & ~(kBlock - 1);
@@ -258,7 +265,8 @@ private:
         lo_ = Coord(data_.box.min().x() >> 6, data_.box.min().y() >> 6, data_.box.min().z() >> 6);
         n_ = Coord(data_.box.dim().x() >> 6, data_.box.dim().y() >> 6, data_.box.dim().z() >> 6);
         const std::size_t n_blocks = static_cast<std::size_t>(n_.x()) *
-                                     static_cast<std::size_t>(n_.y()) * static_cast<std::size_t>(n_.z());
+                                     static_cast<std::size_t>(n_.y()) *
+                                     static_cast<std::size_t>(n_.z());
         first_.assign(n_blocks + 1, 0);
         const auto each = [&](auto&& fn) {
             for (std::uint32_t f = 0; f < data_.triangles.size(); ++f)
@@ -283,7 +291,7 @@ private:
     }
 
     LatticeMeshData data_;
-    Coord lo_, n_; // first block and number of blocks
+    Coord lo_, n_;                   // first block and number of blocks
     std::vector<std::size_t> first_; // faces of block b: faces_[first_[b] .. first_[b + 1])
     std::vector<std::uint32_t> faces_;
 };

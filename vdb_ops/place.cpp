@@ -14,11 +14,11 @@
 namespace taihu {
 namespace {
 
-constexpr double kTolerance = 0.005;     // of the porosity, absolute
-constexpr double kTail = 1e-7;           // share of diameters that the margin round a solid leaves out
-constexpr double kMaxSamples = 4e6;      // points at which porosity is counted
+constexpr double kTolerance = 0.005; // of the porosity, absolute
+constexpr double kTail = 1e-7;       // share of diameters that the margin round a solid leaves out
+constexpr double kMaxSamples = 4e6;  // points at which porosity is counted
 constexpr std::uint64_t kMaxHoles = 100'000'000;
-constexpr std::uint64_t kMaxStreams = 64;       // tried for one porosity
+constexpr std::uint64_t kMaxStreams = 64; // tried for one porosity
 constexpr std::uint32_t kAnotherStream = 0x73747265;
 
 /// Where holes go: a box that holds it, whether a point lies inside, whether a ball meets it.
@@ -64,7 +64,8 @@ public:
     bool meets(const Sphere& ball) const override {
         const Vec3 c = (ball.center - lattice_.origin) / lattice_.voxel_m;
         const double r = ball.radius_m / lattice_.voxel_m;
-        const float d = openvdb::tools::BoxSampler::sample(accessor_, openvdb::Vec3d(c.x, c.y, c.z));
+        const float d =
+            openvdb::tools::BoxSampler::sample(accessor_, openvdb::Vec3d(c.x, c.y, c.z));
         if (d < 0.999f * lattice_.half_width_vox * static_cast<float>(lattice_.voxel_m))
             return d < ball.radius_m; // in the band, or inside
         return any_solid_leaf(c, r);
@@ -72,7 +73,8 @@ public:
 
 private:
     Vec3 world(const openvdb::Coord& c) const {
-        return lattice_.origin + Vec3{double(c.x()), double(c.y()), double(c.z())} * lattice_.voxel_m;
+        return lattice_.origin +
+               Vec3{double(c.x()), double(c.y()), double(c.z())} * lattice_.voxel_m;
     }
 
     /// Beyond the band: look for solid voxels in the leaves that the ball meets.
@@ -106,7 +108,8 @@ private:
             // The surface lies a part of a voxel beyond a solid voxel: its own distance.
             if (const float d = leaf->getValue(v);
                 d < 0 && length(Vec3{double(p.x()), double(p.y()), double(p.z())} - c) +
-                                 d / lattice_.voxel_m < r)
+                                 d / lattice_.voxel_m <
+                             r)
                 return true;
         }
         return false;
@@ -117,14 +120,18 @@ private:
     Box box_;
 };
 
-[[noreturn]] void refuse(const std::string& what) { throw Error(Fault::bad_argument, "holes: " + what); }
+[[noreturn]] void refuse(const std::string& what) {
+    throw Error(Fault::bad_argument, "holes: " + what);
+}
 
 void check_placement(const Placement& p) {
     const int given = p.count.has_value() + p.porosity.has_value() + p.density_m3.has_value();
     if (given != 1)
-        refuse(std::to_string(given) + " of count, porosity and density are given; give exactly one");
+        refuse(std::to_string(given) +
+               " of count, porosity and density are given; give exactly one");
     if (!(p.scale_m > 0) || !std::isfinite(p.scale_m))
-        refuse("scale is " + std::to_string(p.scale_m) + " m, must be finite and > 0; give a length");
+        refuse("scale is " + std::to_string(p.scale_m) +
+               " m, must be finite and > 0; give a length");
     if (p.count && (*p.count < 1 || *p.count > kMaxHoles))
         refuse("count is " + std::to_string(*p.count) + ", must be 1..1e8; ask for fewer");
     if (p.porosity && !(*p.porosity >= 0 && *p.porosity <= 0.95))
@@ -133,8 +140,8 @@ void check_placement(const Placement& p) {
         refuse("density is " + std::to_string(*p.density_m3) + " per m^3, must be finite and > 0");
 }
 
-/// The box that centres of a stationary process are drawn in: all but kTail of the holes that meet the
-/// region have theirs there.
+/// The box that centres of a stationary process are drawn in: all but kTail of the holes that meet
+/// the region have theirs there.
 Box stationary_box(const Law& law, const Placement& placement, const Region& region) {
     return region.box().dilated(0.5 * placement.scale_m * law.quantile(1 - kTail));
 }
@@ -212,7 +219,8 @@ public:
             for (int y = lo[1]; y <= hi[1]; ++y) {
                 const double rest = r * r - (x - c.x) * (x - c.x) - (y - c.y) * (y - c.y);
                 for (int z = lo[2]; rest > 0 && z <= hi[2]; ++z)
-                    if (char& there = there_[index(x, y, z)]; there && (z - c.z) * (z - c.z) < rest) {
+                    if (char& there = there_[index(x, y, z)];
+                        there && (z - c.z) * (z - c.z) < rest) {
                         there = 0;
                         --n_left_;
                     }
@@ -225,7 +233,8 @@ public:
 private:
     std::size_t index(int x, int y, int z) const {
         return (static_cast<std::size_t>(x) * static_cast<std::size_t>(n_[1]) +
-                static_cast<std::size_t>(y)) * static_cast<std::size_t>(n_[2]) +
+                static_cast<std::size_t>(y)) *
+                   static_cast<std::size_t>(n_[2]) +
                static_cast<std::size_t>(z);
     }
     Box box_;
@@ -235,8 +244,8 @@ private:
     std::size_t n_all_ = 0, n_left_ = 0;
 };
 
-/// The prefix of one stream whose porosity is nearest to the target; `next` is that of one hole more or
-/// fewer, on the other side of it.
+/// The prefix of one stream whose porosity is nearest to the target; `next` is that of one hole
+/// more or fewer, on the other side of it.
 PlacedHoles place_prefix(const HoleStream& stream, double target, const Region& region,
                          PorositySamples samples, double& next, Progress* progress) {
     PlacedHoles placed;
@@ -276,10 +285,9 @@ PlacedHoles place_porosity(const Law& law, const Placement& placement, const Reg
     double next = 0;
     for (std::uint64_t stream = 0; stream < kMaxStreams; ++stream) {
         const auto w = Rng{placement.seed, kAnotherStream}.words(stream);
-        const std::uint64_t seed =
-            stream == 0 ? placement.seed : std::uint64_t{w[0]} << 32 | w[1];
-        placed = place_prefix(HoleStream(law, box, placement.scale_m, seed), target, region, samples, next,
-                              progress);
+        const std::uint64_t seed = stream == 0 ? placement.seed : std::uint64_t{w[0]} << 32 | w[1];
+        placed = place_prefix(HoleStream(law, box, placement.scale_m, seed), target, region,
+                              samples, next, progress);
         if (std::fabs(*placed.porosity - target) <= kTolerance)
             return placed;
     }

@@ -23,16 +23,17 @@ struct Placement {
 
 struct PlacedHoles {
     std::vector<Sphere> holes;
-    std::uint64_t n_missed = 0; ///< of the stream, dropped because they do not touch the solid
+    std::uint64_t n_missed = 0;     ///< of the stream, dropped because they do not touch the solid
     std::optional<double> porosity; ///< reached, when it was asked for, on a lattice of samples
 };
 
-/// Holes of a law in a solid. `count`: uniform centres inside the solid. `density`, `porosity`: centres
-/// of a stationary process, so they may lie outside by a radius; holes that miss the solid are dropped;
-/// `porosity` takes the first holes of a stream, as many as come nearest to the target; where one large
-/// hole steps over it, other streams of the same seed are tried in turn.
+/// Holes of a law in a solid. `count`: uniform centres inside the solid. `density`, `porosity`:
+/// centres of a stationary process, so they may lie outside by a radius; holes that miss the solid
+/// are dropped; `porosity` takes the first holes of a stream, as many as come nearest to the
+/// target; where one large hole steps over it, other streams of the same seed are tried in turn.
 /// The same on any number of threads; a longer list (more `count`) begins with the shorter one.
-/// \throws Error bad_argument: not exactly one number, or one out of range; numeric: the porosity cannot be
+/// \throws Error bad_argument: not exactly one number, or one out of range; numeric: the porosity
+/// cannot be
 ///   met (the message says what can), or the solid is too thin for uniform centres to meet it.
 PlacedHoles place_holes(const Law& law, const Placement& placement, const openvdb::FloatGrid& solid,
                         Progress* progress = nullptr);

@@ -48,9 +48,10 @@ void check_lattice(const Lattice& lattice, const openvdb::CoordBBox& box) {
                                              ", must be 2..16; 3 is usual");
     for (int axis = 0; axis < 3; ++axis)
         if (box.min()[axis] < -(1 << 30) || box.max()[axis] > (1 << 30))
-            throw Error(Fault::bad_argument,
-                        "rasterize: the solid reaches beyond voxel 2^30; use a larger voxel, or move "
-                        "the solid nearer to the origin");
+            throw Error(
+                Fault::bad_argument,
+                "rasterize: the solid reaches beyond voxel 2^30; use a larger voxel, or move "
+                "the solid nearer to the origin");
 }
 
 } // namespace
@@ -97,7 +98,8 @@ openvdb::FloatGrid::Ptr rasterize(const Field& field, const Lattice& lattice, Pr
                     }
             const std::size_t done = ++n_done;
             if (done * 100 / n_blocks != (done - 1) * 100 / n_blocks)
-                report_fraction(progress, static_cast<double>(done) / static_cast<double>(n_blocks));
+                report_fraction(progress,
+                                static_cast<double>(done) / static_cast<double>(n_blocks));
         }
     });
     auto accessor = grid->getAccessor();
@@ -115,8 +117,10 @@ Lattice lattice_of(const openvdb::FloatGrid& grid) {
         throw Error(Fault::bad_argument, where + ": not a level set; convert it first");
     const openvdb::Vec3d voxel = grid.voxelSize();
     const bool axis_aligned =
-        grid.transform().isLinear() && grid.indexToWorld(openvdb::Vec3d(1, 0, 0)).eq(
-            grid.indexToWorld(openvdb::Vec3d(0.0)) + openvdb::Vec3d(voxel.x(), 0, 0), 1e-9 * voxel.x());
+        grid.transform().isLinear() &&
+        grid.indexToWorld(openvdb::Vec3d(1, 0, 0))
+            .eq(grid.indexToWorld(openvdb::Vec3d(0.0)) + openvdb::Vec3d(voxel.x(), 0, 0),
+                1e-9 * voxel.x());
     if (!grid.hasUniformVoxels() || !axis_aligned)
         throw Error(Fault::bad_argument,
                     where + ": its voxels are not upright cubes; resample it on a uniform grid");
@@ -126,9 +130,9 @@ Lattice lattice_of(const openvdb::FloatGrid& grid) {
     lattice.origin = {origin.x(), origin.y(), origin.z()};
     lattice.half_width_vox = static_cast<float>(grid.background() / voxel.x());
     if (!(lattice.half_width_vox >= 2 && lattice.half_width_vox < 1000))
-        throw Error(Fault::bad_argument, where + ": its half band is " +
-                                             std::to_string(lattice.half_width_vox) +
-                                             " voxels, at least 2 are needed; rebuild the level set");
+        throw Error(Fault::bad_argument,
+                    where + ": its half band is " + std::to_string(lattice.half_width_vox) +
+                        " voxels, at least 2 are needed; rebuild the level set");
     return lattice;
 }
 

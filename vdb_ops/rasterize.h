@@ -16,7 +16,8 @@ openvdb::FloatGrid::Ptr rasterize(const Field& field, const Lattice& lattice,
                                   Progress* progress = nullptr);
 
 /// The lattice that `grid` lies on.
-/// \throws Error bad_argument, naming the grid: not a level set, voxels that are not cubes, a rotated
+/// \throws Error bad_argument, naming the grid: not a level set, voxels that are not cubes, a
+/// rotated
 ///   or sheared transform, or a half width below 2 voxels.
 Lattice lattice_of(const openvdb::FloatGrid& grid);
 

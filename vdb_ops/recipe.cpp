@@ -11,7 +11,9 @@ using Json = nlohmann::ordered_json; // keys stay as they were put in
 
 constexpr int kVersion = 1;
 
-Json parsed(const std::string& node) { return Json::parse(node); }
+Json parsed(const std::string& node) {
+    return Json::parse(node);
+}
 
 std::string node(const char* kind, Json body) {
     Json out;
@@ -49,7 +51,8 @@ std::string shape_node(const ShapeSettings& s) {
     return node(std::string(shape_name(s.kind)).c_str(), std::move(body));
 }
 
-std::string mesh_node(const std::string& name, const std::string& sha256, double unit_m, bool z_up) {
+std::string mesh_node(const std::string& name, const std::string& sha256, double unit_m,
+                      bool z_up) {
     Json body = {{"file", name}, {"sha256", sha256}, {"unit_m", unit_m}};
     if (z_up)
         body["up"] = "z";

@@ -10,9 +10,10 @@
 
 namespace taihu {
 
-/// Recipes say how a solid was made: JSON text, version 1, kept in every output. These functions write
-/// them from the inside out; each returns one node of the tree, `{"kind": {...}}`, as text. Keys come in
-/// a fixed order and numbers in their shortest form, so the same recipe is the same text.
+/// Recipes say how a solid was made: JSON text, version 1, kept in every output. These functions
+/// write them from the inside out; each returns one node of the tree, `{"kind": {...}}`, as text.
+/// Keys come in a fixed order and numbers in their shortest form, so the same recipe is the same
+/// text.
 
 std::string shape_node(const ShapeSettings& shape);
 /// A mesh file: its base name and hash, its unit of length, and whether its Z axis points up.
@@ -22,10 +23,12 @@ std::string level_set_node(const std::string& name, const std::string& sha256);
 /// Holes from a table.
 std::string holes_node(const std::string& name, const std::string& sha256);
 /// Holes from a law file.
-std::string holes_node(const std::string& name, const std::string& sha256, const Placement& placement);
+std::string holes_node(const std::string& name, const std::string& sha256,
+                       const Placement& placement);
 std::string difference_node(const std::string& of, const std::string& minus);
 /// \param n_pieces  absent: all.
-std::string clean_node(const std::string& of, std::optional<std::size_t> n_pieces, bool fill_bubbles);
+std::string clean_node(const std::string& of, std::optional<std::size_t> n_pieces,
+                       bool fill_bubbles);
 
 struct RecipeLod {
     int n_levels = 1;

@@ -38,7 +38,8 @@ void check_settings(const ShapeSettings& s) {
     check_range("lumps", s.lumps, 0.1, 16);
     const bool round = s.kind == ShapeKind::cylinder || s.kind == ShapeKind::torus;
     if ((round || s.kind == ShapeKind::sphere) && s.size_m.x != s.size_m.z)
-        throw Error(Fault::bad_argument, std::string("shape: a ") + std::string(shape_name(s.kind)) +
+        throw Error(Fault::bad_argument, std::string("shape: a ") +
+                                             std::string(shape_name(s.kind)) +
                                              " is as wide as it is deep; give equal X and Z sizes");
     if (s.kind == ShapeKind::sphere && s.size_m.x != s.size_m.y)
         throw Error(Fault::bad_argument,
@@ -51,18 +52,19 @@ void check_settings(const ShapeSettings& s) {
 TriMesh icosphere(int level) {
     const double g = (1 + std::sqrt(5.0)) / 2;
     TriMesh mesh;
-    mesh.positions = {{-1, g, 0}, {1, g, 0}, {-1, -g, 0}, {1, -g, 0}, {0, -1, g}, {0, 1, g},
-                      {0, -1, -g}, {0, 1, -g}, {g, 0, -1}, {g, 0, 1}, {-g, 0, -1}, {-g, 0, 1}};
-    mesh.triangles = {{0, 11, 5}, {0, 5, 1}, {0, 1, 7}, {0, 7, 10}, {0, 10, 11}, {1, 5, 9}, {5, 11, 4},
-                      {11, 10, 2}, {10, 7, 6}, {7, 1, 8}, {3, 9, 4}, {3, 4, 2}, {3, 2, 6}, {3, 6, 8},
-                      {3, 8, 9}, {4, 9, 5}, {2, 4, 11}, {6, 2, 10}, {8, 6, 7}, {9, 8, 1}};
+    mesh.positions = {{-1, g, 0},  {1, g, 0},  {-1, -g, 0}, {1, -g, 0}, {0, -1, g},  {0, 1, g},
+                      {0, -1, -g}, {0, 1, -g}, {g, 0, -1},  {g, 0, 1},  {-g, 0, -1}, {-g, 0, 1}};
+    mesh.triangles = {{0, 11, 5}, {0, 5, 1},  {0, 1, 7},   {0, 7, 10}, {0, 10, 11},
+                      {1, 5, 9},  {5, 11, 4}, {11, 10, 2}, {10, 7, 6}, {7, 1, 8},
+                      {3, 9, 4},  {3, 4, 2},  {3, 2, 6},   {3, 6, 8},  {3, 8, 9},
+                      {4, 9, 5},  {2, 4, 11}, {6, 2, 10},  {8, 6, 7},  {9, 8, 1}};
     for (Vec3& p : mesh.positions)
         p = normalized(p);
     for (int i = 0; i < level; ++i) {
         std::map<std::pair<std::uint32_t, std::uint32_t>, std::uint32_t> middles;
         const auto middle = [&](std::uint32_t a, std::uint32_t b) {
-            const auto [it, added] =
-                middles.try_emplace(std::minmax(a, b), static_cast<std::uint32_t>(mesh.positions.size()));
+            const auto [it, added] = middles.try_emplace(
+                std::minmax(a, b), static_cast<std::uint32_t>(mesh.positions.size()));
             if (added)
                 mesh.positions.push_back(normalized(mesh.positions[a] + mesh.positions[b]));
             return it->second;
@@ -81,8 +83,12 @@ TriMesh icosphere(int level) {
 double value_noise(const Rng& rng, const Vec3& p) {
     const Vec3 cell{std::floor(p.x), std::floor(p.y), std::floor(p.z)};
     const auto at = [&](int dx, int dy, int dz) {
-        const auto part = [](double v) { return static_cast<std::uint64_t>(static_cast<std::int64_t>(v)) & 0x1fffff; };
-        return 2 * rng.uniform(part(cell.x + dx) << 42 | part(cell.y + dy) << 21 | part(cell.z + dz)) - 1;
+        const auto part = [](double v) {
+            return static_cast<std::uint64_t>(static_cast<std::int64_t>(v)) & 0x1fffff;
+        };
+        return 2 * rng.uniform(part(cell.x + dx) << 42 | part(cell.y + dy) << 21 |
+                               part(cell.z + dz)) -
+               1;
     };
     const auto ease = [](double t) { return t * t * (3 - 2 * t); };
     const auto mix = [](double a, double b, double t) { return a + (b - a) * t; };
@@ -114,8 +120,8 @@ TriMesh boulder(const ShapeSettings& s) {
 TriMesh box_mesh(const Vec3& half) {
     TriMesh mesh;
     for (int i = 0; i < 8; ++i)
-        mesh.positions.push_back({i & 1 ? half.x : -half.x, i & 2 ? half.y : -half.y,
-                                  i & 4 ? half.z : -half.z});
+        mesh.positions.push_back(
+            {i & 1 ? half.x : -half.x, i & 2 ? half.y : -half.y, i & 4 ? half.z : -half.z});
     mesh.triangles = {{0, 2, 3}, {0, 3, 1}, {4, 5, 7}, {4, 7, 6}, {0, 1, 5}, {0, 5, 4},
                       {2, 6, 7}, {2, 7, 3}, {0, 4, 6}, {0, 6, 2}, {1, 3, 7}, {1, 7, 5}};
     return mesh;
@@ -177,18 +183,25 @@ ShapeKind shape_kind(std::string_view name) {
                                          "icosphere, boulder");
 }
 
-std::string_view shape_name(ShapeKind kind) { return kNames[static_cast<std::size_t>(kind)]; }
+std::string_view shape_name(ShapeKind kind) {
+    return kNames[static_cast<std::size_t>(kind)];
+}
 
 TriMesh shape_mesh(const ShapeSettings& s) {
     check_settings(s);
     const Vec3 half = s.size_m * 0.5;
     const int sides = std::max(8, 2 << s.subdivisions);
     switch (s.kind) {
-    case ShapeKind::box: return box_mesh(half);
-    case ShapeKind::cylinder: return cylinder_mesh(half.x, half.y, sides);
-    case ShapeKind::torus: return torus_mesh(half.x - s.tube_m / 2, s.tube_m / 2, sides);
-    case ShapeKind::boulder: return boulder(s);
-    default: break;
+    case ShapeKind::box:
+        return box_mesh(half);
+    case ShapeKind::cylinder:
+        return cylinder_mesh(half.x, half.y, sides);
+    case ShapeKind::torus:
+        return torus_mesh(half.x - s.tube_m / 2, s.tube_m / 2, sides);
+    case ShapeKind::boulder:
+        return boulder(s);
+    default:
+        break;
     }
     TriMesh mesh = icosphere(s.subdivisions);
     for (Vec3& p : mesh.positions)
@@ -217,7 +230,8 @@ std::unique_ptr<Field> shape_field(const ShapeSettings& s) {
             box, [ring = half.x - s.tube_m / 2, tube = s.tube_m / 2](const Vec3& p) {
                 return torus_distance(p, ring, tube);
             });
-    default: break;
+    default:
+        break;
     }
     return std::make_unique<MeshField>(
         close_mesh(shape_mesh(s), std::string(shape_name(s.kind)), CloseRule::none));

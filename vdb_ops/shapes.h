@@ -17,24 +17,23 @@ std::string_view shape_name(ShapeKind kind);
 /// A base shape, centred on the origin; what a kind does not use is ignored by it and said so.
 struct ShapeSettings {
     ShapeKind kind = ShapeKind::boulder;
-    Vec3 size_m{1, 1, 1};     ///< extents along X, Y, Z [m], each > 0
-    double tube_m = 0.25;     ///< torus: thickness of the ring [m], > 0, < half of the outer diameter
-    int subdivisions = 5;     ///< round meshes: icosphere level, 20 * 4^n triangles, 0..8
-    double relief = 0.35;     ///< boulder: height of its lumps, as a share of the radius, 0..0.9
-    double lumps = 1.7;       ///< boulder: lumps per radius, 0.1..16
-    std::uint64_t seed = 0;   ///< boulder
+    Vec3 size_m{1, 1, 1};   ///< extents along X, Y, Z [m], each > 0
+    double tube_m = 0.25;   ///< torus: thickness of the ring [m], > 0, < half of the outer diameter
+    int subdivisions = 5;   ///< round meshes: icosphere level, 20 * 4^n triangles, 0..8
+    double relief = 0.35;   ///< boulder: height of its lumps, as a share of the radius, 0..0.9
+    double lumps = 1.7;     ///< boulder: lumps per radius, 0.1..16
+    std::uint64_t seed = 0; ///< boulder
 };
 
-/// The shape as a closed, outward triangle mesh. Sphere and ellipsoid are icospheres; cylinder and torus
-/// have 2 * 2^subdivisions sides (8 at least); the boulder is an icosphere whose radius is
-/// 1 + relief * noise(direction * lumps), five octaves of value noise, fitted into size_m.
-/// The same settings give the same bytes on every platform, but for the last bit of cos and sin in
-/// cylinder and torus.
-/// \throws Error bad_argument naming the setting and its range.
+/// The shape as a closed, outward triangle mesh. Sphere and ellipsoid are icospheres; cylinder and
+/// torus have 2 * 2^subdivisions sides (8 at least); the boulder is an icosphere whose radius is 1
+/// + relief * noise(direction * lumps), five octaves of value noise, fitted into size_m. The same
+/// settings give the same bytes on every platform, but for the last bit of cos and sin in cylinder
+/// and torus. \throws Error bad_argument naming the setting and its range.
 TriMesh shape_mesh(const ShapeSettings& settings);
 
-/// The shape as a field: exact distances for sphere, ellipsoid, box, cylinder and torus, those of the
-/// mesh for icosphere and boulder.
+/// The shape as a field: exact distances for sphere, ellipsoid, box, cylinder and torus, those of
+/// the mesh for icosphere and boulder.
 std::unique_ptr<Field> shape_field(const ShapeSettings& settings);
 
 } // namespace taihu

@@ -32,11 +32,11 @@ void check_finite(const openvdb::FloatGrid& grid, const std::string& where) {
     });
     for (std::size_t i = 0; i < bad.size(); ++i)
         if (bad[i])
-            throw Error(Fault::bad_input,
-                        where + ": a voxel near (" + std::to_string(leaves[i]->origin().x()) + ", " +
-                            std::to_string(leaves[i]->origin().y()) + ", " +
-                            std::to_string(leaves[i]->origin().z()) +
-                            ") is not finite; write the level set again");
+            throw Error(Fault::bad_input, where + ": a voxel near (" +
+                                              std::to_string(leaves[i]->origin().x()) + ", " +
+                                              std::to_string(leaves[i]->origin().y()) + ", " +
+                                              std::to_string(leaves[i]->origin().z()) +
+                                              ") is not finite; write the level set again");
 }
 
 /// A 8-4-4-4-12 id from the hash of everything else in the file.
@@ -68,7 +68,8 @@ VdbFile read_vdb(const std::filesystem::path& path) {
         for (const auto& grid : *grids)
             if (!result.solid && grid && grid->isType<openvdb::FloatGrid>() &&
                 grid->getGridClass() == openvdb::GRID_LEVEL_SET)
-                result.solid = openvdb::gridPtrCast<openvdb::FloatGrid>(file.readGrid(grid->getName()));
+                result.solid =
+                    openvdb::gridPtrCast<openvdb::FloatGrid>(file.readGrid(grid->getName()));
         file.close();
     } catch (const std::exception& e) {
         throw Error(Fault::bad_input, where + ": cannot be read as OpenVDB (" +
@@ -76,7 +77,8 @@ VdbFile read_vdb(const std::filesystem::path& path) {
     }
     if (!result.solid)
         throw Error(Fault::bad_input,
-                    where + ": holds no float level set; convert a fog volume to a level set first");
+                    where +
+                        ": holds no float level set; convert a fog volume to a level set first");
     try {
         lattice_of(*result.solid);
     } catch (const Error& e) {
@@ -92,7 +94,8 @@ void write_vdb(const std::filesystem::path& path, const openvdb::FloatGrid& soli
                const std::string& recipe) {
     const auto folder = path.has_parent_path() ? path.parent_path() : std::filesystem::path(".");
     auto grid = openvdb::FloatGrid::create(std::const_pointer_cast<openvdb::FloatTree>(
-        std::static_pointer_cast<const openvdb::FloatTree>(solid.constTreePtr()))); // shares the tree
+        std::static_pointer_cast<const openvdb::FloatTree>(
+            solid.constTreePtr()))); // shares the tree
     grid->setTransform(solid.transform().copy());
     grid->setGridClass(openvdb::GRID_LEVEL_SET);
     grid->setName("surface");

@@ -12,7 +12,8 @@ struct VdbFile {
 };
 
 /// The first level set of a .vdb file.
-/// \throws Error bad_input: not a .vdb, damaged, no float level set in it, a non-finite voxel, or as
+/// \throws Error bad_input: not a .vdb, damaged, no float level set in it, a non-finite voxel, or
+/// as
 ///   lattice_of(); io. OpenVDB's own messages are cut to one line.
 VdbFile read_vdb(const std::filesystem::path& path);
 

@@ -20,8 +20,8 @@ float inside_share(float d) {
 
 } // namespace
 
-// Tents of half widths 1 and 2 have second moments 1/6 and 4/6, which cancel in (4 a - b) / 3; integer
-// widths make sums over a lattice exact for planes along its axes.
+// Tents of half widths 1 and 2 have second moments 1/6 and 4/6, which cancel in (4 a - b) / 3;
+// integer widths make sums over a lattice exact for planes along its axes.
 double volume_m3(const openvdb::FloatGrid& solid) {
     const double voxel = lattice_of(solid).voxel_m;
     using Leaf = openvdb::FloatTree::LeafNodeType;
@@ -29,17 +29,18 @@ double volume_m3(const openvdb::FloatGrid& solid) {
     solid.tree().getNodes(leaves);
     std::vector<double> sums(leaves.size());
     const float inverse = static_cast<float>(1 / voxel);
-    tbb::parallel_for(tbb::blocked_range<std::size_t>(0, leaves.size(), 64), [&](const auto& range) {
-        for (std::size_t l = range.begin(); l < range.end(); ++l) {
-            const float* v = leaves[l]->buffer().data();
-            double sum = 0;
-            for (int i = 0; i < 512; ++i) {
-                const float d = v[i] * inverse;
-                sum += static_cast<double>(4 * inside_share(d) - inside_share(0.5f * d));
+    tbb::parallel_for(
+        tbb::blocked_range<std::size_t>(0, leaves.size(), 64), [&](const auto& range) {
+            for (std::size_t l = range.begin(); l < range.end(); ++l) {
+                const float* v = leaves[l]->buffer().data();
+                double sum = 0;
+                for (int i = 0; i < 512; ++i) {
+                    const float d = v[i] * inverse;
+                    sum += static_cast<double>(4 * inside_share(d) - inside_share(0.5f * d));
+                }
+                sums[l] = sum / 3;
             }
-            sums[l] = sum / 3;
-        }
-    });
+        });
     double n_voxels = 0;
     for (const double s : sums)
         n_voxels += s;

@@ -11,8 +11,8 @@
 namespace taihu {
 namespace {
 
-// A half band of 3 voxels measured 0.033 leaves per voxel^2 of a rough rock; 2.3 KiB a leaf with its tree,
-// twice over for a base beside its result.
+// A half band of 3 voxels measured 0.033 leaves per voxel^2 of a rough rock; 2.3 KiB a leaf with
+// its tree, twice over for a base beside its result.
 constexpr double kLeavesPerVoxel2 = 0.035, kBytesPerLeaf = 2 * 2350;
 
 /// Memory that the machine can give now [bytes]; a large number where it does not say.
@@ -48,9 +48,10 @@ bool any_inside(const openvdb::FloatGrid& solid) {
 
 double voxel_for(const Box& box, int dim) {
     if (dim < 4 || dim > 65536)
-        throw Error(Fault::bad_argument, "dim: " + std::to_string(dim) +
-                                             " voxels along the longest axis, must be 4..65536; 256 "
-                                             "is usual");
+        throw Error(Fault::bad_argument,
+                    "dim: " + std::to_string(dim) +
+                        " voxels along the longest axis, must be 4..65536; 256 "
+                        "is usual");
     const double longest = box.longest();
     if (!(longest > 0) || !std::isfinite(longest))
         throw Error(Fault::bad_argument, "dim: the solid has no extent; give one that has");
@@ -67,9 +68,10 @@ void refuse_if_too_large(double area_m2, const Box& box, double voxel_m) {
     if (needed <= limit && box.longest() / voxel_m <= 65536 * 1.001)
         return;
     char text[192];
-    std::snprintf(text, sizeof text,
-                  "refused: voxel size %.3g m would need about %s (limit %s); smallest that fits: %.3g m",
-                  voxel_m, human_bytes(needed).c_str(), human_bytes(limit).c_str(), 1.01 * fits);
+    std::snprintf(
+        text, sizeof text,
+        "refused: voxel size %.3g m would need about %s (limit %s); smallest that fits: %.3g m",
+        voxel_m, human_bytes(needed).c_str(), human_bytes(limit).c_str(), 1.01 * fits);
     throw Error(Fault::unsupported, text);
 }
 

@@ -338,7 +338,8 @@ void GlbReader::read_primitive(const Json& primitive, const std::string& path,
     spend(n_vertices + (mode == kTriangles ? n / 3 : n - 2), path);
 
     const std::size_t first = level.positions.size();
-    add_vertices(read_vectors(position), read_normals(*attributes, path, n_vertices), placement, level);
+    add_vertices(read_vectors(position), read_normals(*attributes, path, n_vertices), placement,
+                 level);
     const bool mirrored = placement.mirrors();
     const auto corner = [&](std::size_t i) {
         if (!indices)

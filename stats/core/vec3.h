@@ -13,22 +13,46 @@ struct Vec3 {
     friend constexpr bool operator==(const Vec3&, const Vec3&) = default;
 };
 
-constexpr Vec3 operator+(const Vec3& a, const Vec3& b) { return {a.x + b.x, a.y + b.y, a.z + b.z}; }
-constexpr Vec3 operator-(const Vec3& a, const Vec3& b) { return {a.x - b.x, a.y - b.y, a.z - b.z}; }
-constexpr Vec3 operator-(const Vec3& a) { return {-a.x, -a.y, -a.z}; }
-constexpr Vec3 operator*(const Vec3& a, double s) { return {a.x * s, a.y * s, a.z * s}; }
-constexpr Vec3 operator*(double s, const Vec3& a) { return a * s; }
-constexpr Vec3 operator/(const Vec3& a, double s) { return {a.x / s, a.y / s, a.z / s}; }
-constexpr Vec3& operator+=(Vec3& a, const Vec3& b) { return a = a + b; }
-constexpr Vec3& operator-=(Vec3& a, const Vec3& b) { return a = a - b; }
-constexpr Vec3& operator*=(Vec3& a, double s) { return a = a * s; }
+constexpr Vec3 operator+(const Vec3& a, const Vec3& b) {
+    return {a.x + b.x, a.y + b.y, a.z + b.z};
+}
+constexpr Vec3 operator-(const Vec3& a, const Vec3& b) {
+    return {a.x - b.x, a.y - b.y, a.z - b.z};
+}
+constexpr Vec3 operator-(const Vec3& a) {
+    return {-a.x, -a.y, -a.z};
+}
+constexpr Vec3 operator*(const Vec3& a, double s) {
+    return {a.x * s, a.y * s, a.z * s};
+}
+constexpr Vec3 operator*(double s, const Vec3& a) {
+    return a * s;
+}
+constexpr Vec3 operator/(const Vec3& a, double s) {
+    return {a.x / s, a.y / s, a.z / s};
+}
+constexpr Vec3& operator+=(Vec3& a, const Vec3& b) {
+    return a = a + b;
+}
+constexpr Vec3& operator-=(Vec3& a, const Vec3& b) {
+    return a = a - b;
+}
+constexpr Vec3& operator*=(Vec3& a, double s) {
+    return a = a * s;
+}
 
-constexpr double dot(const Vec3& a, const Vec3& b) { return a.x * b.x + a.y * b.y + a.z * b.z; }
+constexpr double dot(const Vec3& a, const Vec3& b) {
+    return a.x * b.x + a.y * b.y + a.z * b.z;
+}
 constexpr Vec3 cross(const Vec3& a, const Vec3& b) {
     return {a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x};
 }
-constexpr double length_squared(const Vec3& a) { return dot(a, a); }
-inline double length(const Vec3& a) { return std::sqrt(length_squared(a)); }
+constexpr double length_squared(const Vec3& a) {
+    return dot(a, a);
+}
+inline double length(const Vec3& a) {
+    return std::sqrt(length_squared(a));
+}
 
 /// `a` scaled to length 1; the zero vector stays zero.
 inline Vec3 normalized(const Vec3& a) {

@@ -55,7 +55,9 @@ TEST(File, RefusesALongFileBeforeReadingIt) {
     EXPECT_THROW(read_file(scratch / "long", 4), Error);
 }
 
-TEST(BaseName, IsOneLine) { EXPECT_EQ(base_name("/a/b\nc.obj"), "b\\x0ac.obj"); }
+TEST(BaseName, IsOneLine) {
+    EXPECT_EQ(base_name("/a/b\nc.obj"), "b\\x0ac.obj");
+}
 
 } // namespace
 } // namespace taihu

@@ -14,10 +14,10 @@ TEST(Hull, OfAConvexBodyIsTheBody) {
 }
 
 TEST(Hull, OfATorusClosesItsHole) {
-    const TriMesh ring = shape_mesh({.kind = ShapeKind::torus, .size_m = {1, 0.2, 1}, .tube_m = 0.2,
-                                     .subdivisions = 6});
-    // A disc of radius 0.4 and height 0.2 with a rounded rim: pi r^2 h + pi^2 r (h/2)^2 + 4/3 pi (h/2)^3;
-    // 128 x 64 sides lose about 1e-3 of it.
+    const TriMesh ring = shape_mesh(
+        {.kind = ShapeKind::torus, .size_m = {1, 0.2, 1}, .tube_m = 0.2, .subdivisions = 6});
+    // A disc of radius 0.4 and height 0.2 with a rounded rim: pi r^2 h + pi^2 r (h/2)^2 + 4/3 pi
+    // (h/2)^3; 128 x 64 sides lose about 1e-3 of it.
     const double pi = 3.14159265358979;
     const double exact = pi * 0.16 * 0.2 + pi * pi * 0.4 * 0.01 + 4.0 / 3 * pi * 1e-3;
     EXPECT_NEAR(hull_volume_m3(ring), exact, 2e-3 * exact);

@@ -13,10 +13,12 @@ using testing::HasSubstr;
 using testing::IsEmpty;
 using testing::StartsWith;
 
-const std::vector<std::string> kVerbs = {"fit",  "sample", "shape",   "voxelize", "carve", "mesh",
-                                         "lod",  "check",  "measure", "render",   "info"};
+const std::vector<std::string> kVerbs = {"fit", "sample", "shape",   "voxelize", "carve", "mesh",
+                                         "lod", "check",  "measure", "render",   "info"};
 
-long lines(const std::string& text) { return std::count(text.begin(), text.end(), '\n'); }
+long lines(const std::string& text) {
+    return std::count(text.begin(), text.end(), '\n');
+}
 
 TEST(Command, EveryVerbHasHelpWithExamples) {
     const Scratch scratch;
@@ -95,11 +97,12 @@ TEST(Command, NoClobberKeepsWhatIsThere) {
 TEST(Command, ASignalCancelsAndLeavesNothing) {
     const Scratch scratch;
     for (const auto& [signal, code] : {std::pair("INT", 130), std::pair("TERM", 143)}) {
-        const Finished said = run("timeout -s " + std::string(signal) +
-                                      " 0.5 taihu shape boulder --dim 4000 -q -o big.vdb; test $? = 124 || "
-                                      "exit 9; timeout --preserve-status -s " + signal +
-                                      " 0.5 taihu shape boulder --dim 4000 -q -o big.vdb",
-                                  scratch.path());
+        const Finished said =
+            run("timeout -s " + std::string(signal) +
+                    " 0.5 taihu shape boulder --dim 4000 -q -o big.vdb; test $? = 124 || "
+                    "exit 9; timeout --preserve-status -s " +
+                    signal + " 0.5 taihu shape boulder --dim 4000 -q -o big.vdb",
+                scratch.path());
         EXPECT_EQ(said.exit_code, code);
         EXPECT_FALSE(std::filesystem::exists(scratch / "big.vdb"));
     }

@@ -14,8 +14,8 @@ namespace {
 namespace fs = std::filesystem;
 
 TEST(Layout, IncludesNeverGoUpwards) {
-    const std::map<std::string, int> rank = {
-        {"stats/core", 0}, {"stats", 1}, {"vdb_ops", 2}, {"mesh_out", 3}, {"tools", 4}, {"tests", 5}};
+    const std::map<std::string, int> rank = {{"stats/core", 0}, {"stats", 1}, {"vdb_ops", 2},
+                                             {"mesh_out", 3},   {"tools", 4}, {"tests", 5}};
     const auto module_of = [](const std::string& path) {
         if (path.starts_with("stats/core/"))
             return std::string("stats/core");
@@ -42,8 +42,9 @@ TEST(Layout, IncludesNeverGoUpwards) {
 }
 
 TEST(Layout, TheTopLevelIsFixed) {
-    const std::set<std::string> known = {"CMakeLists.txt", "CMakePresets.json", "vdb_ops", "stats",
-                                         "mesh_out", "tools", "tests", "data", "README.md"};
+    const std::set<std::string> known = {
+        "CMakeLists.txt", "CMakePresets.json", "vdb_ops", "stats", "mesh_out", "tools", "tests",
+        "data",           "README.md"};
     const std::set<std::string> ignored = {"build", "out"}; // git does not see them
     for (const auto& entry : fs::directory_iterator(TAIHU_SOURCE)) {
         const std::string name = entry.path().filename();
@@ -53,7 +54,8 @@ TEST(Layout, TheTopLevelIsFixed) {
 
 TEST(Layout, HeadersSayNothingOfTheLibrariesBehindThem) {
     // Draco, glTF, OpenEXR, JSON and CLI11 types stay in sources and internal headers.
-    const std::regex foreign("#include <(draco|nlohmann|OpenEXR|Imf|CLI|OpenMesh|embree3|boost|png)");
+    const std::regex foreign(
+        "#include <(draco|nlohmann|OpenEXR|Imf|CLI|OpenMesh|embree3|boost|png)");
     for (const char* top : {"stats", "vdb_ops", "mesh_out"})
         for (const auto& entry : fs::recursive_directory_iterator(fs::path(TAIHU_SOURCE) / top)) {
             const std::string name = entry.path().filename();

@@ -31,8 +31,8 @@ TEST(Verbs, FromMeasurementsToACertifiedRock) {
     result("taihu shape boulder --size 1,0.8,0.7 --seed 3 -o base.ply", scratch);
     const json base = result("taihu voxelize base.ply --dim 96 -o base.vdb", scratch);
     EXPECT_EQ(base["found"].size(), 0u);
-    const json holes =
-        result("taihu sample law.json --in base.vdb --scale 25% --porosity 0.2 -o holes.csv", scratch);
+    const json holes = result(
+        "taihu sample law.json --in base.vdb --scale 25% --porosity 0.2 -o holes.csv", scratch);
     EXPECT_NEAR(holes["porosity"].get<double>(), 0.2, 0.005);
     const json rock = result("taihu carve base.vdb --holes holes.csv -o rock.vdb", scratch);
     EXPECT_NEAR(rock["porosity"].get<double>(), 0.2, 0.005);
@@ -43,7 +43,8 @@ TEST(Verbs, FromMeasurementsToACertifiedRock) {
         const json& level = chain["levels"][j];
         EXPECT_LE(level["error_m"].get<double>(), level["bound_m"].get<double>());
         if (j > 0) {
-            EXPECT_LT(level["triangles"].get<int>(), chain["levels"][j - 1]["triangles"].get<int>());
+            EXPECT_LT(level["triangles"].get<int>(),
+                      chain["levels"][j - 1]["triangles"].get<int>());
         }
     }
     EXPECT_EQ(json::parse(read_file(scratch / "report.json")), chain);
@@ -68,8 +69,9 @@ TEST(Verbs, TheThesisTablesAreThoseOfTheThesis) {
     const Scratch scratch;
     const Finished said = run("taihu fit " + kRock1 + " --method thesis", scratch.path());
     EXPECT_EQ(said.exit_code, 0);
-    for (const char* number : {"16.33", "16.09", "4.92", "2.45", "2.39", "2.76", "0.62", "0.35", "0.70",
-                               "0.81", "0.86", "0.92", "0.98", "0.99", "72.911", "55.989", "5.714"})
+    for (const char* number :
+         {"16.33", "16.09", "4.92", "2.45", "2.39", "2.76", "0.62", "0.35", "0.70", "0.81", "0.86",
+          "0.92", "0.98", "0.99", "72.911", "55.989", "5.714"})
         EXPECT_THAT(said.out, HasSubstr(number));
 }
 
@@ -79,7 +81,8 @@ TEST(Verbs, OutputsAreTheSameBytesOnAnyNumberOfThreads) {
     result("taihu shape boulder -o base.ply", scratch);
     for (const std::string extension : {".vdb", ".glb"}) {
         for (const std::string n : {"1", "2", "16"})
-            result("taihu carve base.ply --dim 64 --holes law.json --scale 30% --porosity 0.2 --threads " +
+            result("taihu carve base.ply --dim 64 --holes law.json --scale 30% --porosity 0.2 "
+                   "--threads " +
                        n + " -o rock" + n + extension,
                    scratch);
         const std::string one = read_file(scratch / ("rock1" + extension));
@@ -109,7 +112,8 @@ TEST(Verbs, CarveWritesEveryFormatAndCheckReadsIt) {
 
 TEST(Verbs, CheckSaysNoWithExit3) {
     const Scratch scratch;
-    write_file(scratch / "open.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 1 4 3\n");
+    write_file(scratch / "open.obj",
+               "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 1 4 3\n");
     const Finished said = run("taihu check open.obj --json", scratch.path());
     EXPECT_EQ(said.exit_code, 3);
     EXPECT_FALSE(json::parse(said.out)["holds"].get<bool>());
@@ -120,17 +124,20 @@ TEST(Verbs, ALawWithoutAScaleOrANumberIsRefused) {
     const Scratch scratch;
     result("taihu fit " + kRock1 + " -o law.json", scratch);
     result("taihu shape box --dim 32 -o base.vdb", scratch);
-    const Finished scale = run("taihu carve base.vdb --holes law.json --count 3 -o a.vdb", scratch.path());
+    const Finished scale =
+        run("taihu carve base.vdb --holes law.json --count 3 -o a.vdb", scratch.path());
     EXPECT_EQ(scale.exit_code, 2);
     EXPECT_THAT(scale.err, HasSubstr("--scale"));
-    const Finished number = run("taihu carve base.vdb --holes law.json --scale 10% -o a.vdb", scratch.path());
+    const Finished number =
+        run("taihu carve base.vdb --holes law.json --scale 10% -o a.vdb", scratch.path());
     EXPECT_EQ(number.exit_code, 2);
     EXPECT_THAT(number.err, HasSubstr("--count"));
 }
 
 TEST(Verbs, HolesOfALawMayFollowItsOwnDensity) {
     const Scratch scratch;
-    write_file(scratch / "d.csv", "# unit=m\n# area=2\ndiameter\n.1\n.12\n.2\n.15\n.11\n.3\n.13\n.14\n.1\n.18\n");
+    write_file(scratch / "d.csv",
+               "# unit=m\n# area=2\ndiameter\n.1\n.12\n.2\n.15\n.11\n.3\n.13\n.14\n.1\n.18\n");
     const json law = result("taihu fit d.csv --detection-limit 0.1 -o law.json", scratch);
     ASSERT_TRUE(law["n_v"].is_object());
     const json holes = result("taihu sample law.json --box 2,2,2 -o holes.csv", scratch);
@@ -145,8 +152,10 @@ TEST(Verbs, PiecesAndBubblesAreKeptOnRequest) {
     const Scratch scratch;
     result("taihu shape sphere --dim 64 -o ball.vdb", scratch);
     write_file(scratch / "holes.csv", "x_m,y_m,z_m,diameter_m\n0,0,0,0.4\n");
-    EXPECT_EQ(result("taihu carve ball.vdb --holes holes.csv -o a.vdb", scratch)["bubbles_filled"], 1);
-    const json kept = result("taihu carve ball.vdb --holes holes.csv --bubbles keep -o b.vdb", scratch);
+    EXPECT_EQ(result("taihu carve ball.vdb --holes holes.csv -o a.vdb", scratch)["bubbles_filled"],
+              1);
+    const json kept =
+        result("taihu carve ball.vdb --holes holes.csv --bubbles keep -o b.vdb", scratch);
     EXPECT_EQ(kept["bubbles"], 1);
     EXPECT_EQ(kept["bubbles_filled"], 0);
     EXPECT_EQ(result("taihu check b.vdb", scratch)["levels"][0]["cavities"], 1);

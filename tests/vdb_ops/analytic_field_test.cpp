@@ -29,10 +29,12 @@ TEST(EllipsoidDistance, IsNoLargerThanToAnySurfacePointAndMatchesTheNearest) {
         constexpr int kN = 500;
         for (int u = 0; u < kN; ++u)
             for (int v = 0; v < kN; ++v) {
-                const double theta = std::numbers::pi * u / (kN - 1), phi = 2 * std::numbers::pi * v / kN;
-                nearest = std::min(nearest, length(p - Vec3{a.x * std::sin(theta) * std::cos(phi),
-                                                            a.y * std::cos(theta),
-                                                            a.z * std::sin(theta) * std::sin(phi)}));
+                const double theta = std::numbers::pi * u / (kN - 1),
+                             phi = 2 * std::numbers::pi * v / kN;
+                nearest =
+                    std::min(nearest, length(p - Vec3{a.x * std::sin(theta) * std::cos(phi),
+                                                      a.y * std::cos(theta),
+                                                      a.z * std::sin(theta) * std::sin(phi)}));
             }
         const double d = std::fabs(ellipsoid_distance(p, a));
         EXPECT_LE(d, nearest + 1e-9);
@@ -48,8 +50,9 @@ TEST(AnalyticDistances, AreOneLipschitzAndZeroOnTheSurface) {
         EXPECT_LE(std::fabs(box_distance(p, {1, 0.5, 0.7}) - box_distance(q, {1, 0.5, 0.7})), step);
         EXPECT_LE(std::fabs(cylinder_distance(p, 1, 0.5) - cylinder_distance(q, 1, 0.5)), step);
         EXPECT_LE(std::fabs(torus_distance(p, 1, 0.3) - torus_distance(q, 1, 0.3)), step);
-        EXPECT_LE(std::fabs(ellipsoid_distance(p, {1, 0.5, 0.7}) - ellipsoid_distance(q, {1, 0.5, 0.7})),
-                  step);
+        EXPECT_LE(
+            std::fabs(ellipsoid_distance(p, {1, 0.5, 0.7}) - ellipsoid_distance(q, {1, 0.5, 0.7})),
+            step);
     }
     EXPECT_EQ(box_distance({1, 0.2, 0}, {1, 0.5, 0.7}), 0);
     EXPECT_NEAR(box_distance({1.3, 0.9, 0}, {1, 0.5, 0.7}), 0.5, 1e-15);

@@ -35,11 +35,13 @@ TEST(Carve, RemovesTheVolumeOfDisjointHoles) {
 }
 
 TEST(Carve, SphereMinusSphereHasItsAnalyticVolume) {
-    // A unit ball minus a ball of radius 1/2 centred on its surface: the lens of two spherical caps.
+    // A unit ball minus a ball of radius 1/2 centred on its surface: the lens of two spherical
+    // caps.
     const double r = 0.5, d = 1;
     const double lens = std::numbers::pi * std::pow(1 + r - d, 2) *
                         (d * d + 2 * d * r - 3 * r * r + 2 * d + 6 * r - 3) / (12 * d);
-    const double removed = carve(*ball_rock(1, 0.01), std::vector<Sphere>{{{0, 0, 1}, r}}).removed_m3;
+    const double removed =
+        carve(*ball_rock(1, 0.01), std::vector<Sphere>{{{0, 0, 1}, r}}).removed_m3;
     EXPECT_NEAR(removed, lens, 2e-3 * lens); // the rim is resolved to a fraction of a voxel only
 }
 
@@ -56,8 +58,8 @@ TEST(Carve, IsTheMaximumOfRockAndHolesAtEveryVoxel) {
                 for (const Sphere& h : holes)
                     exact = std::max(exact, h.radius_m - length(p - h.center));
                 // Float on tens of voxels of 4 cm.
-                ASSERT_NEAR(accessor.getValue(openvdb::Coord(i, j, k)), std::clamp(exact, -0.12, 0.12),
-                            2e-6);
+                ASSERT_NEAR(accessor.getValue(openvdb::Coord(i, j, k)),
+                            std::clamp(exact, -0.12, 0.12), 2e-6);
             }
 }
 
@@ -96,7 +98,8 @@ TEST(Carve, HolesThatCoverTheRockLeaveNothing) {
 
 TEST(Carve, HolesFarAwayOrHugeAreHandled) {
     const auto rock = ball_rock();
-    EXPECT_EQ(grid_hash(*carve(*rock, std::vector<Sphere>{{{1e6, 0, 0}, 1}}).rock), grid_hash(*rock));
+    EXPECT_EQ(grid_hash(*carve(*rock, std::vector<Sphere>{{{1e6, 0, 0}, 1}}).rock),
+              grid_hash(*rock));
     // A ball of 500 m through the middle: nearly half of the rock goes (lens of two caps).
     // Float holds 1e4 voxels to 1e-3 of one.
     const double half = carve(*rock, std::vector<Sphere>{{{500, 0, 0}, 500}}).removed_m3;

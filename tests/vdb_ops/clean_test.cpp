@@ -15,7 +15,9 @@ namespace {
 
 constexpr double kPi = std::numbers::pi;
 
-double ball_m3(double r) { return 4.0 / 3 * kPi * r * r * r; }
+double ball_m3(double r) {
+    return 4.0 / 3 * kPi * r * r * r;
+}
 
 openvdb::FloatGrid::Ptr balls(std::vector<Sphere> spheres, double voxel_m = 0.05) {
     return rasterize(BallsField(spheres), {voxel_m, {}, 3});
@@ -65,26 +67,30 @@ TEST(Clean, ALargeBubbleWithUniformBlocksIsFilled) {
 }
 
 TEST(Clean, RebuildsDistancesBetweenNearSurfaces) {
-    // A small ball two voxels beside a large one: removed, the gap's distances are the large one's again.
+    // A small ball two voxels beside a large one: removed, the gap's distances are the large one's
+    // again.
     const auto two = balls({{{}, 1}, {{1.4, 0, 0}, 0.3}});
     const CleanResult result = clean(*two);
     const auto expected = ball_rock();
     for (auto it = expected->cbeginValueOn(); it; ++it)
-        ASSERT_NEAR(result.solid->tree().getValue(it.getCoord()), it.getValue(), 0.2 * 0.05) << it.getCoord();
+        ASSERT_NEAR(result.solid->tree().getValue(it.getCoord()), it.getValue(), 0.2 * 0.05)
+            << it.getCoord();
 }
 
 TEST(Clean, OfAHoledRockLeavesOnePieceWithoutBubblesAndIsIdempotent) {
     std::vector<Sphere> holes;
     for (std::uint64_t i = 0; i < 400; ++i) {
         const Rng rng{21, 1};
-        holes.push_back({{2 * rng.uniform(i, 0) - 1, 2 * rng.uniform(i, 1) - 1, 2 * rng.uniform(i, 2) - 1},
-                         0.05 + 0.12 * rng.uniform(i, 3)});
+        holes.push_back(
+            {{2 * rng.uniform(i, 0) - 1, 2 * rng.uniform(i, 1) - 1, 2 * rng.uniform(i, 2) - 1},
+             0.05 + 0.12 * rng.uniform(i, 3)});
     }
     const auto carved = carve(*ball_rock(1, 0.025), holes).rock;
     const CleanResult once = clean(*carved);
     EXPECT_GT(once.n_pieces_removed, 0u);
     EXPECT_GT(once.n_bubbles_filled, 0u);
-    EXPECT_NEAR(volume_m3(*once.solid), volume_m3(*carved) - once.removed_m3 + once.filled_m3, 1e-9);
+    EXPECT_NEAR(volume_m3(*once.solid), volume_m3(*carved) - once.removed_m3 + once.filled_m3,
+                1e-9);
     const CleanResult twice = clean(*once.solid);
     EXPECT_EQ(twice.n_pieces, 1u);
     EXPECT_EQ(twice.n_bubbles, 0u);

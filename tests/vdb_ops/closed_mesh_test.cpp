@@ -57,7 +57,8 @@ TEST(CloseMesh, RefusesAnOpenMeshUnderNone) {
     open.triangles.resize(10);
     expect_error(Fault::bad_input, "cube: open: 4 open edges in 1 loops",
                  [&] { close_mesh(open, "cube", CloseRule::none); });
-    expect_error(Fault::bad_input, "--close loops", [&] { close_mesh(open, "cube", CloseRule::none); });
+    expect_error(Fault::bad_input, "--close loops",
+                 [&] { close_mesh(open, "cube", CloseRule::none); });
 }
 
 TEST(CloseMesh, WeldsCornersThatAreGivenTwice) {
@@ -130,7 +131,8 @@ TEST(CloseMesh, WeldsCracksWhenNothingElseHasAnInside) {
     const TriMesh base = cube();
     for (std::size_t i = 0; i < base.triangles.size(); ++i) {
         for (const std::uint32_t v : base.triangles[i])
-            soup.positions.push_back(base.positions[v] + Vec3{1e-6 * double(i % 3), -1e-6 * double(i % 2), 0});
+            soup.positions.push_back(base.positions[v] +
+                                     Vec3{1e-6 * double(i % 3), -1e-6 * double(i % 2), 0});
         const auto n = static_cast<std::uint32_t>(soup.positions.size());
         soup.triangles.push_back({n - 3, n - 2, n - 1});
     }

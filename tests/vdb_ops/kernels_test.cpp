@@ -25,22 +25,26 @@
 namespace taihu {
 namespace {
 
-double number(std::uint64_t item, std::uint32_t draw) { return Rng{3, 5}.uniform(item, draw); }
+double number(std::uint64_t item, std::uint32_t draw) {
+    return Rng{3, 5}.uniform(item, draw);
+}
 
 TEST(Kernels, MinBallsIsTheDistanceToTheUnionInTheBand) {
     constexpr float kWidth = 3;
     for (std::uint64_t trial = 0; trial < 200; ++trial) {
         std::vector<LeafBall> balls;
         for (std::uint32_t i = 0; i < 4; ++i)
-            balls.push_back({float(20 * number(trial, 4 * i) - 6), float(20 * number(trial, 4 * i + 1) - 6),
-                             float(20 * number(trial, 4 * i + 2) - 6), float(8 * number(trial, 4 * i + 3))});
+            balls.push_back(
+                {float(20 * number(trial, 4 * i) - 6), float(20 * number(trial, 4 * i + 1) - 6),
+                 float(20 * number(trial, 4 * i + 2) - 6), float(8 * number(trial, 4 * i + 3))});
         std::vector<float> plain(512, kWidth);
         plain_min_balls(balls.data(), balls.size(), kWidth, plain.data());
         for (int v = 0; v < 512; ++v) {
             double exact = kWidth;
             for (const auto& b : balls)
                 exact = std::min(exact, length(Vec3{v / 64 - double(b.x), v / 8 % 8 - double(b.y),
-                                                    v % 8 - double(b.z)}) - double(b.r));
+                                                    v % 8 - double(b.z)}) -
+                                            double(b.r));
             // Float arithmetic on numbers below 32: about 4e-6.
             ASSERT_NEAR(plain[static_cast<std::size_t>(v)], exact, 1e-5);
         }
@@ -51,8 +55,9 @@ TEST(Kernels, EveryInstructionSetGivesTheSameBits) {
     for (std::uint64_t trial = 0; trial < 500; ++trial) {
         std::vector<LeafBall> balls;
         for (std::uint32_t i = 0; i < 4; ++i)
-            balls.push_back({float(20 * number(trial, 4 * i) - 6), float(20 * number(trial, 4 * i + 1) - 6),
-                             float(20 * number(trial, 4 * i + 2) - 6), float(8 * number(trial, 4 * i + 3))});
+            balls.push_back(
+                {float(20 * number(trial, 4 * i) - 6), float(20 * number(trial, 4 * i + 1) - 6),
+                 float(20 * number(trial, 4 * i + 2) - 6), float(8 * number(trial, 4 * i + 3))});
         std::vector<float> a(512, 3.f), b(512, 3.f);
         plain_min_balls(balls.data(), balls.size(), 3, a.data());
         min_balls(balls.data(), balls.size(), 3, b.data());

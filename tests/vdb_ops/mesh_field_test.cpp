@@ -59,7 +59,7 @@ void expect_exact(const TriMesh& given, double voxel_m, int step) {
                                                       field.mesh().positions[t[2]]));
                 const float value = accessor.getValue(openvdb::Coord(i, j, k));
                 if (d > 1e-9 * voxel_m) { // on the surface itself either side is right
-                    ASSERT_EQ(value < 0, std::fabs(winding(field.mesh(), p)) > 0.5)
+                    ASSERT_EQ(value<0, std::fabs(winding(field.mesh(), p))> 0.5)
                         << i << ' ' << j << ' ' << k;
                 }
                 // 1e-5 voxel: float rows of leaf-local coordinates.
@@ -74,8 +74,10 @@ TEST(MeshField, BoulderIsExactAgainstBruteForce) {
 }
 
 TEST(MeshField, TorusIsExactAgainstBruteForce) {
-    expect_exact(shape_mesh({.kind = ShapeKind::torus, .size_m = {1, 0.3, 1}, .tube_m = 0.3, .subdivisions = 4}),
-                 1.0 / 40, 2);
+    expect_exact(
+        shape_mesh(
+            {.kind = ShapeKind::torus, .size_m = {1, 0.3, 1}, .tube_m = 0.3, .subdivisions = 4}),
+        1.0 / 40, 2);
 }
 
 TEST(MeshField, CubeWithFacesOnVoxelPlanesHasTheRightSigns) {
@@ -108,8 +110,8 @@ TEST(MeshField, WallsInsideAUnionVanish) {
     for (const Vec3& p : shape_mesh({.kind = ShapeKind::box}).positions)
         two.positions.push_back(p + Vec3{0.53, 0.01, 0.02});
     for (std::size_t t = 0; t < 12; ++t)
-        two.triangles.push_back({two.triangles[t][0] + base, two.triangles[t][1] + base,
-                                 two.triangles[t][2] + base});
+        two.triangles.push_back(
+            {two.triangles[t][0] + base, two.triangles[t][1] + base, two.triangles[t][2] + base});
     const auto grid = rasterize(MeshField(close_mesh(two, "two")), {1.0 / 32, {}, 3});
     // The wall x = 1/2 of the first box runs through the inside of the second.
     EXPECT_FLOAT_EQ(grid->tree().getValue(openvdb::Coord(16, 0, 0)), -3.f / 32);
@@ -117,7 +119,8 @@ TEST(MeshField, WallsInsideAUnionVanish) {
 }
 
 TEST(MeshField, ACavityIsRemoved) {
-    TriMesh mesh = shape_mesh({.kind = ShapeKind::icosphere, .size_m = {2, 2, 2}, .subdivisions = 4});
+    TriMesh mesh =
+        shape_mesh({.kind = ShapeKind::icosphere, .size_m = {2, 2, 2}, .subdivisions = 4});
     TriMesh inner = shape_mesh({.kind = ShapeKind::icosphere, .subdivisions = 4});
     const double outer_m3 = signed_volume_m3(mesh), inner_m3 = signed_volume_m3(inner);
     const auto base = static_cast<std::uint32_t>(mesh.positions.size());

@@ -25,7 +25,8 @@ TEST(PlaceHoles, CountGivesThatManyCentresInside) {
         mean += 2 * h.radius_m / 500;
         r5 += length_squared(h.center) / 500;
     }
-    // Four standard errors: sd of an exponential is its mean; E r^2 = 3/5 with sd 0.26 in a unit ball.
+    // Four standard errors: sd of an exponential is its mean; E r^2 = 3/5 with sd 0.26 in a unit
+    // ball.
     EXPECT_NEAR(mean, 0.1, 4 * 0.1 / std::sqrt(500));
     EXPECT_NEAR(r5, 0.6, 4 * 0.26 / std::sqrt(500));
 }
@@ -63,7 +64,8 @@ TEST(PlaceHoles, DensityIsAPoissonProcessOfTouchingBalls) {
         const PlacedHoles placed = place_holes(Law::constant(2 * r), p, *ball_rock());
         sum += static_cast<double>(placed.holes.size());
         for (const Sphere& h : placed.holes)
-            ASSERT_LT(length(h.center), 1 + r + 0.01); // voxel 0.05: distances there are exact to 1 %
+            ASSERT_LT(length(h.center),
+                      1 + r + 0.01); // voxel 0.05: distances there are exact to 1 %
     }
     EXPECT_NEAR(sum / kRuns, mean, 4 * std::sqrt(mean / kRuns) + 0.01 * mean);
 }
@@ -81,7 +83,8 @@ TEST(PlaceHoles, InABoxWorksTheSame) {
 TEST(PlaceHoles, RefusesByName) {
     const auto rock = ball_rock();
     const Law law = Law::exponential(1);
-    expect_error(Fault::bad_argument, "0 of count, porosity and density", [&] { place_holes(law, {}, *rock); });
+    expect_error(Fault::bad_argument, "0 of count, porosity and density",
+                 [&] { place_holes(law, {}, *rock); });
     Placement p = count(3);
     p.porosity = 0.2;
     expect_error(Fault::bad_argument, "2 of count", [&] { place_holes(law, p, *rock); });
@@ -91,7 +94,8 @@ TEST(PlaceHoles, RefusesByName) {
     Placement full;
     full.porosity = 1;
     expect_error(Fault::bad_argument, "0..0.95", [&] { place_holes(law, full, *rock); });
-    Placement coarse; // balls a thousand times the rock: nearly every one takes all of it or nothing
+    Placement
+        coarse; // balls a thousand times the rock: nearly every one takes all of it or nothing
     coarse.porosity = 0.05;
     expect_error(Fault::numeric, "one hole apart",
                  [&] { place_holes(Law::constant(1000), coarse, *rock); });

@@ -44,7 +44,8 @@ TEST(Rasterize, IsBitIdenticalOnOneThreadAndMany) {
 TEST(Rasterize, HonoursTheOriginOfTheLattice) {
     const BallsField field(std::array<Sphere, 1>{{{{1, 2, 3}, 0.5}}});
     const auto here = rasterize(field, {0.05, {0.01, 0.02, 0.03}, 3});
-    EXPECT_NEAR(here->tree().getValue(here->transform().worldToIndexCellCentered({1, 2, 3.5})), 0, 0.03);
+    EXPECT_NEAR(here->tree().getValue(here->transform().worldToIndexCellCentered({1, 2, 3.5})), 0,
+                0.03);
     const Lattice lattice = lattice_of(*here);
     EXPECT_NEAR(lattice.origin.z, 0.03, 1e-12);
     EXPECT_NEAR(lattice.voxel_m, 0.05, 1e-12);

@@ -14,9 +14,11 @@ constexpr double kPi = std::numbers::pi;
 
 std::vector<ShapeSettings> all_kinds() {
     std::vector<ShapeSettings> all;
-    for (const char* name : {"sphere", "ellipsoid", "box", "cylinder", "torus", "icosphere", "boulder"}) {
+    for (const char* name :
+         {"sphere", "ellipsoid", "box", "cylinder", "torus", "icosphere", "boulder"}) {
         ShapeSettings s{.kind = shape_kind(name), .tube_m = 0.3, .subdivisions = 4};
-        if (s.kind == ShapeKind::ellipsoid || s.kind == ShapeKind::box || s.kind == ShapeKind::boulder)
+        if (s.kind == ShapeKind::ellipsoid || s.kind == ShapeKind::box ||
+            s.kind == ShapeKind::boulder)
             s.size_m = {1, 0.8, 0.6};
         all.push_back(s);
     }
@@ -77,8 +79,9 @@ TEST(Shapes, RefuseSettingsOutOfRangeByName) {
     expect_error(Fault::bad_argument, "did you mean 'boulder'?", [] { shape_kind("bolder"); });
     expect_error(Fault::bad_argument, "size_m.y", [] { shape_mesh({.size_m = {1, 0, 1}}); });
     expect_error(Fault::bad_argument, "relief", [] { shape_mesh({.relief = 2}); });
-    expect_error(Fault::bad_argument, "use ellipsoid",
-                 [] { shape_mesh({.kind = ShapeKind::sphere, .size_m = {1, 2, 1}}); });
+    expect_error(Fault::bad_argument, "use ellipsoid", [] {
+        shape_mesh({.kind = ShapeKind::sphere, .size_m = {1, 2, 1}});
+    });
     expect_error(Fault::bad_argument, "tube_m",
                  [] { shape_mesh({.kind = ShapeKind::torus, .tube_m = 0.6}); });
 }

@@ -24,14 +24,16 @@ TEST(VdbFile, TheSameSolidGivesTheSameBytes) {
     write_vdb(scratch / "b.vdb", *ball_rock(), "");
     EXPECT_EQ(read_file(scratch / "a.vdb"), read_file(scratch / "b.vdb"));
     write_vdb(scratch / "c.vdb", *ball_rock(0.9), "");
-    EXPECT_NE(read_file(scratch / "a.vdb").substr(21, 36), read_file(scratch / "c.vdb").substr(21, 36));
+    EXPECT_NE(read_file(scratch / "a.vdb").substr(21, 36),
+              read_file(scratch / "c.vdb").substr(21, 36));
 }
 
 TEST(VdbFile, LeavesNoTemporaryBehind) {
     const Scratch scratch;
     write_vdb(scratch / "a.vdb", *ball_rock(), "");
     EXPECT_EQ(std::distance(std::filesystem::directory_iterator(scratch.path()), {}), 1);
-    expect_error(Fault::io, "cannot write", [&] { write_vdb(scratch / "no/a.vdb", *ball_rock(), ""); });
+    expect_error(Fault::io, "cannot write",
+                 [&] { write_vdb(scratch / "no/a.vdb", *ball_rock(), ""); });
 }
 
 TEST(VdbFile, RefusesWhatIsNoLevelSet) {
@@ -48,7 +50,8 @@ TEST(VdbFile, RefusesWhatIsNoLevelSet) {
     grid->setGridClass(openvdb::GRID_FOG_VOLUME);
     fog.write({grid});
     fog.close();
-    expect_error(Fault::bad_input, "holds no float level set", [&] { read_vdb(scratch / "fog.vdb"); });
+    expect_error(Fault::bad_input, "holds no float level set",
+                 [&] { read_vdb(scratch / "fog.vdb"); });
 }
 
 TEST(VdbFile, RefusesNonFiniteVoxels) {

@@ -203,8 +203,7 @@ TEST(GlbReader, NamesWhatIsWrong) {
     refused(replaced("/asset", 3), bad, {"there is no asset"});
     Chunks chunks = small();
     chunks.bin.replace(0, 4, std::string("\0\0\xc0\x7f", 4));
-    expect_refused(join(chunks), MeshFormat::glb, bad,
-                   {"element 0 of accessors[0] is not finite"});
+    expect_refused(join(chunks), MeshFormat::glb, bad, {"element 0 of accessors[0] is not finite"});
 }
 
 TEST(GlbReader, NamesWhatIsWrongWithTheContainer) {
