@@ -2,6 +2,14 @@
 
 say() { printf '\n== %s\n' "$*"; }
 
+# quietly LOG COMMAND...: runs it, its words into LOG; shows their end when it fails.
+quietly() {
+  local log=$1
+  shift
+  mkdir -p "$(dirname "$log")"
+  "$@" >"$log" 2>&1 || { local code=$?; tail -n 40 "$log" >&2; echo "failed: $* (all of it: $log)" >&2; return $code; }
+}
+
 # install_missing KIND...: the packages of tools/packages.txt that these kinds need.
 install_missing() {
   local kind package rest missing=()
