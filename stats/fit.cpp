@@ -2,195 +2,199 @@
 
 #include <algorithm>
 #include <cmath>
-#include <functional>
-#include <numbers>
-
-#include <boost/math/special_functions/gamma.hpp>
-#include <boost/math/tools/minima.hpp>
+#include <numeric>
 
 #include "stats/chi_squared.h"
 #include "stats/core/error.h"
+#include "stats/detection.h"
+#include "stats/likelihood_detail.h"
 #include "stats/number_detail.h"
-#include "stats/wicksell.h"
+#include "stats/peak_detail.h"
 
 namespace taihu {
 namespace {
 
 constexpr std::uint64_t kFewestProfiles = 8, kFewProfiles = 20;
+constexpr double kLeastLength = 1e-9, kMostLength = 1e9;
 
-// Without promotion to long double, whose width differs from machine to machine.
-using Policy = boost::math::policies::policy<boost::math::policies::promote_double<false>>;
-
-using LogLikelihood = std::function<double(double log_rate)>;
-
-double log_likelihood(const Sample& sample, double limit, const SectionLaw& section) {
-    double sum = 0;
-    for (const double d : sample.diameters)
-        sum += section.log_pdf(d);
-    for (const Bin& bin : sample.bins) {
-        if (bin.count == 0)
-            continue;
-        const double above = section.log_survival(bin.lo), past = section.log_survival(bin.hi);
-        sum += static_cast<double>(bin.count) * (above + std::log(-std::expm1(past - above)));
-    }
-    return sum - static_cast<double>(n_profiles(sample)) * section.log_survival(limit);
-}
-
-double mean_profile(const Sample& sample) {
-    double sum = 0;
-    for (const double d : sample.diameters)
-        sum += d;
-    for (const Bin& bin : sample.bins)
-        sum += static_cast<double>(bin.count) * 0.5 * (bin.lo + bin.hi);
-    return sum / static_cast<double>(n_profiles(sample));
-}
-
-// How far the logarithm of the rate may run from where it started: a factor 1.6e5, past which the
-// sizes differ by less than 1e-5.
-constexpr double kFarthest = 12;
-
-[[noreturn]] void refuse_no_spread() {
-    throw Error(Fault::bad_input,
-                "fit: the likelihood has no maximum, all profiles lie at the "
-                "detection limit; mark holes of several sizes or lower the limit");
-}
-
-// The likelihood has one maximum when the profiles spread: towards 0 and towards infinity it falls
-// without end. So a walk uphill brackets it.
-double maximum(const LogLikelihood& log_l, double start) {
-    constexpr double kStride = 0.5;
-    double at = start, height = log_l(at);
-    const double direction = log_l(start + kStride) > height ? kStride : -kStride;
-    while (true) {
-        const double next = log_l(at + direction);
-        if (next <= height)
-            break;
-        at += direction;
-        height = next;
-        if (std::abs(at - start) > kFarthest)
-            refuse_no_spread();
-    }
-    const auto negative = [&](double x) { return -log_l(x); };
-    // 26 bits: a minimum is no sharper than the square root of the machine precision.
-    return boost::math::tools::brent_find_minima(negative, at - kStride, at + kStride, 26).first;
-}
-
-// Where the log-likelihood has fallen to `floor`, on the side of `direction`.
-double crossing(const LogLikelihood& log_l, double peak, double floor, double direction) {
-    double inside = peak, step = 0.1 * direction;
-    while (log_l(inside + step) > floor) {
-        inside += step;
-        step *= 2;
-        if (std::abs(inside - peak) > kFarthest) // flat: one bin holds everything
-            refuse_no_spread();
-    }
-    double outside = inside + step;
-    for (int i = 0; i < 60 && std::abs(outside - inside) > 1e-12; ++i) {
-        const double middle = 0.5 * (inside + outside);
-        (log_l(middle) > floor ? inside : outside) = middle;
-    }
-    return 0.5 * (inside + outside);
-}
-
-// The posterior of N_V: a mixture of Gamma(n + 1/2, exposure) over the likelihood of log rate.
-class NumberPosterior {
-public:
-    NumberPosterior(const LogLikelihood& log_l, double peak, double n, double area, double limit)
-        : shape_(n + 0.5) {
-        constexpr int kPoints = 60; // of a bell: the rule converges faster than any power
-        // exp(-18) of the peak: what lies farther weighs less than 1e-8.
-        const double height = log_l(peak);
-        const double lo = crossing(log_l, peak, height - 18, -1);
-        const double hi = crossing(log_l, peak, height - 18, 1);
-        double sum = 0;
-        for (int i = 0; i <= kPoints; ++i) {
-            const double x = lo + (hi - lo) * i / kPoints;
-            const SectionLaw section(Law::exponential(std::exp(x)));
-            const double weight = std::exp(log_l(x) - height);
-            parts_.push_back({weight, area * section.law().mean() * section.survival(limit)});
-            sum += weight;
-        }
-        for (Part& part : parts_)
-            part.weight /= sum;
-    }
-
-    double quantile(double share) const {
-        double lo = 0, hi = shape_ / parts_.front().exposure;
-        while (cdf(hi) < share)
-            hi *= 2;
-        for (int i = 0; i < 100 && hi - lo > 1e-10 * hi; ++i) {
-            const double middle = 0.5 * (lo + hi);
-            (cdf(middle) < share ? lo : hi) = middle;
-        }
-        return 0.5 * (lo + hi);
-    }
-
-private:
-    struct Part {
-        double weight, exposure;
-    };
-
-    double cdf(double n_v) const {
-        double sum = 0;
-        for (const Part& part : parts_)
-            sum += part.weight * boost::math::gamma_p(shape_, n_v * part.exposure, Policy());
-        return sum;
-    }
-
-    double shape_;
-    std::vector<Part> parts_;
-};
-
-void check_level(double level) {
-    if (!(level >= 0.5 && level <= 0.9999))
+void check_settings(const Sample& sample, Family family, const FitSettings& settings) {
+    if (!(settings.level >= 0.5 && settings.level <= 0.9999))
         throw Error(Fault::bad_argument,
-                    "fit: level is " + shortest(level) + "; must be in 0.5..0.9999");
+                    "fit: level is " + shortest(settings.level) + "; must be in 0.5..0.9999");
+    if (family == Family::empirical)
+        throw Error(Fault::bad_argument, "fit: an empirical law has no parameters; unfold it");
+    if (!settings.resolution)
+        return;
+    if (!(*settings.resolution > 0 && std::isfinite(*settings.resolution)))
+        throw Error(Fault::bad_argument, "fit: resolution is " + shortest(*settings.resolution) +
+                                             "; must be finite and > 0");
+    if (!sample.bins.empty())
+        throw Error(Fault::bad_argument, "fit: a resolution of " + shortest(*settings.resolution) +
+                                             " for a sample in bins; leave it out");
+}
+
+void check_profiles(const Sample& sample) {
+    const std::uint64_t count = n_profiles(sample);
+    if (count < kFewestProfiles)
+        throw Error(Fault::bad_input, "fit: " + std::to_string(count) + " profiles; at least " +
+                                          std::to_string(kFewestProfiles) +
+                                          " are needed, mark more holes");
+    for (const double d : sample.diameters)
+        if (!(d >= kLeastLength && d <= kMostLength))
+            throw Error(Fault::bad_input, "fit: a diameter is " + shortest(d) +
+                                              "; must be in 1e-9..1e9, choose another unit");
+    for (const Bin& bin : sample.bins)
+        if (bin.count > 0 && !(bin.hi >= kLeastLength && bin.hi <= kMostLength))
+            throw Error(Fault::bad_input, "fit: a bin ends at " + shortest(bin.hi) +
+                                              "; must be in 1e-9..1e9, choose another unit");
+}
+
+// Nothing but the limit itself, or the bin that begins there: any law that is steep enough will do.
+void check_spread(const Sample& sample, Family family, double limit) {
+    const auto above = [&](double d) { return d > limit; };
+    const auto filled = [&](const Bin& bin) { return bin.count > 0 && bin.lo > limit; };
+    if (family != Family::constant && std::ranges::none_of(sample.diameters, above) &&
+        std::ranges::none_of(sample.bins, filled))
+        throw Error(Fault::bad_input,
+                    "fit: the likelihood has no maximum, all profiles lie at the "
+                    "detection limit; mark holes of several sizes or lower the limit");
+}
+
+std::optional<double> resolution_for(const Sample& sample, Family family,
+                                     const FitSettings& settings) {
+    const bool needed = family == Family::uniform || family == Family::constant;
+    if (settings.resolution || !needed || sample.diameters.empty())
+        return settings.resolution;
+    return 0.01 * *std::max_element(sample.diameters.begin(), sample.diameters.end());
 }
 
 std::string percent(double share) {
     return std::to_string(static_cast<int>(std::lround(100 * share))) + " %";
 }
 
-} // namespace
+NumberDensity number_density(Likelihood& likelihood, const Peak& peak, double area, double level) {
+    const NumberPosterior posterior(likelihood, peak, area);
+    NumberDensity n_v;
+    n_v.estimate = likelihood.n() /
+                   (area * std::exp(peak.log_mean) * likelihood.seen(peak.log_mean, peak.shape));
+    n_v.lo = std::min(n_v.estimate, posterior.quantile((1 - level) / 2));
+    n_v.hi = std::max(n_v.estimate, posterior.quantile((1 + level) / 2));
+    return n_v;
+}
 
-Fit fit_exponential(const Sample& sample, const FitSettings& settings) {
-    check_level(settings.level);
-    const double limit = detection_limit(sample);
-    const std::uint64_t count = n_profiles(sample);
-    if (count < kFewestProfiles)
-        throw Error(Fault::bad_input, "fit: " + std::to_string(count) + " profiles; at least " +
-                                          std::to_string(kFewestProfiles) +
-                                          " are needed, mark more holes");
-    const LogLikelihood log_l = [&](double log_rate) {
-        return log_likelihood(sample, limit, SectionLaw(Law::exponential(std::exp(log_rate))));
-    };
-    const double start =
-        std::log(std::numbers::pi / (2 * mean_profile(sample))); // E[d] = pi / 2 rate
-    const double peak = maximum(log_l, start);
-
-    Fit fit{Law::exponential(std::exp(peak)), {}, settings.level, 0, 0, {}, limit, count, {}};
-    const auto n = static_cast<double>(count);
-    fit.log_likelihood = log_l(peak);
-    fit.aicc = 2 - 2 * fit.log_likelihood + 4 / (n - 2); // one parameter
-    const double floor = fit.log_likelihood - 0.5 * chi_squared_critical(1, 1 - settings.level);
-    fit.intervals = {
-        {std::exp(crossing(log_l, peak, floor, -1)), std::exp(crossing(log_l, peak, floor, 1))}};
-    if (sample.area) {
-        const SectionLaw section(fit.law);
-        const NumberPosterior posterior(log_l, peak, n, *sample.area, limit);
-        fit.n_v = {.estimate = n / (*sample.area * fit.law.mean() * section.survival(limit)),
-                   .lo = posterior.quantile((1 - settings.level) / 2),
-                   .hi = posterior.quantile((1 + settings.level) / 2),
-                   .extrapolated_share = fit.law.cdf(limit)};
-    }
-    if (count < kFewProfiles)
-        fit.notes.push_back("Only " + std::to_string(count) + " profiles: below " +
+void add_notes(Fit& fit, const Peak& peak, bool open) {
+    if (fit.n_profiles < kFewProfiles)
+        fit.notes.push_back("Only " + std::to_string(fit.n_profiles) + " profiles: below " +
                             std::to_string(kFewProfiles) + " no law can be told from another.");
-    if (fit.law.cdf(limit) > 0.5)
-        fit.notes.push_back(percent(fit.law.cdf(limit)) +
+    const std::string name(family_name(fit.law.family()));
+    if (peak.at_edge)
+        fit.notes.push_back("The likeliest " + name +
+                            " law is at the edge of what is tried: another family fits better.");
+    else if (open)
+        fit.notes.push_back("An interval of the " + name +
+                            " law ends where the search ends: the profiles do not bound it.");
+    if (fit.law.cdf(fit.detection_limit) > 0.5)
+        fit.notes.push_back(percent(fit.law.cdf(fit.detection_limit)) +
                             " of the holes of this law are smaller than the detection limit and "
                             "were not seen by anybody.");
+}
+
+} // namespace
+
+Fit fit_law(const Sample& sample, Family family, const FitSettings& settings) {
+    check_settings(sample, family, settings);
+    const Detection detection(sample);
+    check_profiles(sample);
+    check_spread(sample, family, detection.limit());
+    Likelihood likelihood(sample, detection, family, resolution_for(sample, family, settings));
+    const Peak peak = find_peak(likelihood);
+    Fit fit{law_at(family, peak.log_mean, peak.shape),
+            {},
+            settings.level,
+            peak.log_likelihood,
+            0,
+            {},
+            detection.limit(),
+            n_profiles(sample),
+            {}};
+    const double n = likelihood.n();
+    const auto k = static_cast<double>(parameter_names(family).size());
+    fit.aicc = 2 * k - 2 * fit.log_likelihood + 2 * k * (k + 1) / (n - k - 1);
+    const double depth = 0.5 * chi_squared_critical(1, 1 - settings.level);
+    Region region = likelihood_region(likelihood, peak, fit.log_likelihood - depth);
+    fit.intervals = std::move(region.intervals);
+    for (std::size_t i = 0; i < fit.intervals.size();
+         ++i) { // the search ends before the last digit
+        fit.intervals[i].lo = std::min(fit.intervals[i].lo, fit.law.parameters()[i]);
+        fit.intervals[i].hi = std::max(fit.intervals[i].hi, fit.law.parameters()[i]);
+    }
+    if (detection.area()) {
+        fit.n_v = number_density(likelihood, peak, *detection.area(), settings.level);
+        fit.n_v->extrapolated_share = fit.law.cdf(detection.limit());
+    }
+    add_notes(fit, peak, region.open);
     return fit;
+}
+
+Law likeliest_law(const Sample& sample, Family family, const FitSettings& settings) {
+    check_settings(sample, family, settings);
+    const Detection detection(sample);
+    check_profiles(sample);
+    check_spread(sample, family, detection.limit());
+    Likelihood likelihood(sample, detection, family, resolution_for(sample, family, settings));
+    const Peak peak = find_peak(likelihood);
+    return law_at(family, peak.log_mean, peak.shape);
+}
+
+LawRanking fit_laws(const Sample& sample, std::span<const Family> families,
+                    const FitSettings& settings) {
+    if (families.empty())
+        throw Error(Fault::bad_argument, "fit: no families; name one");
+    for (std::size_t i = 0; i < families.size(); ++i)
+        if (std::find(families.begin(), families.begin() + static_cast<std::ptrdiff_t>(i),
+                      families[i]) != families.begin() + static_cast<std::ptrdiff_t>(i))
+            throw Error(Fault::bad_argument, "fit: the family " +
+                                                 std::string(family_name(families[i])) +
+                                                 " is named twice; name it once");
+    LawRanking ranking;
+    static constexpr std::array kSafe = {Family::exponential};
+    if (n_profiles(sample) < kFewProfiles && !std::ranges::equal(families, kSafe)) {
+        families = kSafe;
+        ranking.notes.emplace_back("Only the exponential law was fitted: fewer than " +
+                                   std::to_string(kFewProfiles) +
+                                   " profiles cannot tell one law from another.");
+    }
+    std::optional<Error> first;
+    for (const Family family : families) {
+        try {
+            ranking.fits.push_back(fit_law(sample, family, settings));
+        } catch (const Error& e) {
+            if (e.fault() == Fault::bad_argument)
+                throw;
+            if (!first)
+                first = e;
+            ranking.notes.push_back(std::string(family_name(family)) + " left out: " + e.what());
+        }
+    }
+    if (ranking.fits.empty())
+        throw *first;
+    std::stable_sort(ranking.fits.begin(), ranking.fits.end(),
+                     [](const Fit& a, const Fit& b) { return a.aicc < b.aicc; });
+    for (const Fit& fit : ranking.fits)
+        ranking.weights.push_back(std::exp(0.5 * (ranking.fits.front().aicc - fit.aicc)));
+    const double sum = std::accumulate(ranking.weights.begin(), ranking.weights.end(), 0.0);
+    for (double& weight : ranking.weights)
+        weight /= sum;
+    if (!ranking.fits.front().n_v)
+        return ranking;
+    LawRanking::Spread spread;
+    for (std::size_t i = 0; i < ranking.fits.size(); ++i)
+        spread.mean += ranking.weights[i] * ranking.fits[i].n_v->estimate;
+    for (std::size_t i = 0; i < ranking.fits.size(); ++i)
+        spread.sd += ranking.weights[i] * std::pow(ranking.fits[i].n_v->estimate - spread.mean, 2);
+    spread.sd = std::sqrt(spread.sd);
+    ranking.n_v = spread;
+    return ranking;
 }
 
 } // namespace taihu

@@ -1,9 +1,12 @@
 #pragma once
+#include <array>
 #include <cstdint>
 #include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
+#include "stats/density.h"
 #include "stats/law.h"
 #include "stats/sample.h"
 
@@ -14,24 +17,20 @@ struct Interval {
     friend constexpr bool operator==(const Interval&, const Interval&) = default;
 };
 
-/// How many hole centres a unit volume holds.
-struct NumberDensity {
-    double estimate = 0, lo = 0, hi = 0; ///< [1 / unit^3]
-    /// Share of these holes whose diameter is below the detection limit: no profile stands for
-    /// them, their number is what the family of the law makes of the seen ones.
-    double extrapolated_share = 0;
-    friend constexpr bool operator==(const NumberDensity&, const NumberDensity&) = default;
-};
-
 struct FitSettings {
     double level = 0.95; ///< of all intervals, 0.5..0.9999
+    /// Diameters are rounded to multiples of this [unit], > 0; a pixel, say. Nothing: they are
+    /// exact, but for uniform and constant laws, whose densities are infinite somewhere: to 1 % of
+    /// the greatest. Refused for binned samples, which have their bins.
+    std::optional<double> resolution = {};
 };
 
 struct Fit {
-    Law law;                          ///< of sphere diameters [unit]
-    std::vector<Interval> intervals;  ///< one for each parameter of the law: profile likelihood
-    double level = 0.95;              ///< of the intervals
-    double log_likelihood = 0;        ///< natural logarithm; of counts when the sample is binned
+    Law law;                         ///< of sphere diameters [unit]
+    std::vector<Interval> intervals; ///< one for each parameter of the law: profile likelihood
+    double level = 0.95;             ///< of the intervals
+    /// Natural logarithm, of densities per unit; of counts when the sample is binned.
+    double log_likelihood = 0;
     double aicc = 0;                  ///< Akaike's criterion, corrected for the sample size
     std::optional<NumberDensity> n_v; ///< nothing when the area is unknown
     double detection_limit = 0;       ///< [unit]
@@ -39,17 +38,48 @@ struct Fit {
     std::vector<std::string> notes; ///< what a reader of the numbers has to know, whole sentences
 };
 
-/// Maximum likelihood of exponential sphere diameters, from the sections that were marked.
+/// Maximum likelihood of sphere diameters, from the sections that were marked.
 ///
-/// A profile d >= d0 has the density f2(d) / (1 - F2(d0)); a bin has F2(hi) - F2(lo) in place of
-/// f2. The interval holds every rate whose likelihood is not rejected by a chi-squared test with
-/// one degree of freedom. N_V = n / (A mu (1 - F2(d0))); its interval is that of N_V ~ Gamma(n +
-/// 1/2, A mu (1 - F2(d0))), averaged over the likelihood of the rate with a flat prior of its
-/// logarithm, by numeric integration: no random numbers.
+/// A profile has the density f2 g / int f2 g, with g what Detection says of limits and edges; a bin
+/// has the integral of it, a rounded diameter its mean over the resolution. An interval holds every
+/// value of its parameter whose likelihood, the others being the best for it, is not rejected by a
+/// chi-squared test with one degree of freedom. N_V = n / (A mu int f2 g); its interval is that of
+/// N_V ~ Gamma(n + 1/2, A mu int f2 g), averaged over the likelihood of the law with a flat prior
+/// of its log mean and shape, by numeric integration: no random numbers.
 ///
-/// \throws Error bad_argument: the level; bad_input: as check_sample, fewer than 8 profiles, or all
-///         of them at the detection limit (no spread to fit).
-/// Cost: about 300 passes over the sample. Fewer than 20 profiles are noted.
-Fit fit_exponential(const Sample& sample, const FitSettings& settings = {});
+/// \param family  not Family::empirical (unfold.h).
+/// \throws Error bad_argument: the level, the resolution, the family; bad_input: as Detection,
+///         fewer than 8 profiles, all of them at the detection limit (no spread to fit), profiles
+///         outside of 1e-9..1e9; numeric: no maximum.
+/// Cost: about 300 passes over the sample, of two parameters 2000. Fewer than 20 profiles are
+/// noted, as are a law at the edge of what is tried and intervals without an end.
+Fit fit_law(const Sample& sample, Family family, const FitSettings& settings = {});
+
+/// The law of fit_law alone, without intervals, densities and notes: some 20 times cheaper, for
+/// resampling.
+/// \throws Error as fit_law.
+Law likeliest_law(const Sample& sample, Family family, const FitSettings& settings = {});
+
+/// Several families fitted to one sample.
+struct LawRanking {
+    std::vector<Fit> fits;       ///< smallest aicc first; at least one
+    std::vector<double> weights; ///< Akaike weights of the fits; they sum to 1
+    /// Mean of the fits' N_V by these weights and how far they spread about it: what the choice of
+    /// the family does, on top of each fit's own interval. Nothing when the area is unknown.
+    struct Spread {
+        double mean = 0, sd = 0;
+    };
+    std::optional<Spread> n_v;
+    std::vector<std::string> notes; ///< families left out, and why
+};
+
+inline constexpr std::array kUsualFamilies = {Family::exponential, Family::gamma, Family::weibull,
+                                              Family::lognormal, Family::constant};
+
+/// fit_law of each family; with fewer than 20 profiles only of the exponential, which is noted.
+/// \throws Error as fit_law, when no family could be fitted, that of the first one; bad_argument:
+///         no family, or one twice.
+LawRanking fit_laws(const Sample& sample, std::span<const Family> families = kUsualFamilies,
+                    const FitSettings& settings = {});
 
 } // namespace taihu

@@ -39,6 +39,51 @@ double smallest(const Sample& sample) {
         ->lo;
 }
 
+void check_area(const std::string& name, double area) {
+    if (!(area > 0 && std::isfinite(area)))
+        refuse(name + " is " + shortest(area) + "; must be finite and > 0");
+}
+
+void check_limit(const std::string& name, double limit) {
+    if (!(limit >= 0 && std::isfinite(limit)))
+        refuse(name + " is " + shortest(limit) + "; must be finite and >= 0");
+}
+
+void check_frames(const Sample& sample) {
+    if (sample.counting == Counting::whole && sample.frames.empty())
+        refuse("whole profiles were counted but no window is known; give its frames");
+    for (std::size_t i = 0; i < sample.frames.size(); ++i) {
+        const auto name = "frames[" + std::to_string(i) + "]";
+        const Frame& frame = sample.frames[i];
+        check_area(name + ".area", frame.area);
+        if (frame.detection_limit)
+            check_limit(name + ".detection_limit", *frame.detection_limit);
+        if (sample.counting == Counting::whole && !frame.window)
+            refuse(name + " has no window although whole profiles were counted; give it");
+    }
+    if (sample.frames.empty() || !sample.area)
+        return;
+    double sum = 0;
+    for (const Frame& frame : sample.frames)
+        sum += frame.area;
+    if (!(std::abs(sum - *sample.area) <= 1e-9 * sum))
+        refuse("area is " + shortest(*sample.area) + " but that of the frames together is " +
+               shortest(sum) + "; leave it out");
+}
+
+// check_sample's end: what needs the profiles to be sound.
+double checked_limit(const Sample& sample) {
+    double limit = sample.detection_limit.value_or(smallest(sample));
+    if (!sample.frames.empty())
+        limit = detection_limit(sample, sample.frames.front());
+    for (const Frame& frame : sample.frames)
+        limit = std::min(limit, detection_limit(sample, frame));
+    if (!(limit <= smallest(sample)))
+        refuse("detection limit is " + shortest(limit) + " but the smallest profile is " +
+               shortest(smallest(sample)) + "; the limit must be >= 0 and not above it");
+    return limit;
+}
+
 } // namespace
 
 std::string_view unit_name(LengthUnit unit) {
@@ -60,9 +105,24 @@ std::uint64_t n_profiles(const Sample& sample) {
     return n;
 }
 
+std::optional<double> searched_area(const Sample& sample) {
+    if (sample.frames.empty())
+        return sample.area;
+    double sum = 0;
+    for (const Frame& frame : sample.frames)
+        sum += frame.area;
+    return sum;
+}
+
+double detection_limit(const Sample& sample, const Frame& frame) {
+    if (frame.detection_limit)
+        return *frame.detection_limit;
+    return sample.detection_limit ? *sample.detection_limit : smallest(sample);
+}
+
 double detection_limit(const Sample& sample) {
     check_sample(sample);
-    return sample.detection_limit ? *sample.detection_limit : smallest(sample);
+    return checked_limit(sample);
 }
 
 void check_sample(const Sample& sample) {
@@ -82,14 +142,12 @@ void check_sample(const Sample& sample) {
         refuse("has no profiles; mark some holes");
     if (n > kMost)
         refuse("has " + std::to_string(n) + " profiles; at most 1e9 are taken");
-    if (sample.area && !(*sample.area > 0 && std::isfinite(*sample.area)))
-        refuse("area is " + shortest(*sample.area) + "; must be finite and > 0");
-    if (!sample.detection_limit)
-        return;
-    const double limit = *sample.detection_limit;
-    if (!(limit >= 0 && limit <= smallest(sample)))
-        refuse("detection limit is " + shortest(limit) + " but the smallest profile is " +
-               shortest(smallest(sample)) + "; the limit must be >= 0 and not above it");
+    if (sample.area)
+        check_area("area", *sample.area);
+    if (sample.detection_limit)
+        check_limit("detection limit", *sample.detection_limit);
+    check_frames(sample);
+    checked_limit(sample);
 }
 
 } // namespace taihu

@@ -8,6 +8,7 @@
 #include "stats/io/measurements.h"
 #include "stats/thesis.h"
 #include "tools/console.h"
+#include "tools/units.h"
 
 namespace taihu {
 namespace {
@@ -15,7 +16,8 @@ namespace {
 struct FitArgs {
     std::vector<std::filesystem::path> files;
     std::filesystem::path out;
-    std::string method = "ml", unit;
+    std::string method = "ml", unit, scale_bar;
+    std::vector<std::string> masks;
     MeasurementSettings settings;
     FitSettings fit;
 };
@@ -52,7 +54,8 @@ void run_thesis(const FitArgs& args, const Measurements& measurements, const Con
 /// A small sample has a fit, but no chi-squared test.
 std::string chi_squared_line(const Sample& sample, const Fit& fit) {
     try {
-        const ChiSquaredTest chi = chi_squared_test(sample, fit.law, 1);
+        const ChiSquaredTest chi =
+            chi_squared_test(sample, fit.law, static_cast<int>(fit.intervals.size()));
         return fmt::format("chi-squared on the profiles: {:.2f}, df {}, p {:.2f}", chi.statistic,
                            chi.df, chi.p_value);
     } catch (const Error& e) {
@@ -60,13 +63,39 @@ std::string chi_squared_line(const Sample& sample, const Fit& fit) {
     }
 }
 
-void tell(const Fit& fit, const Sample& sample, const Console& console) {
+/// `rate 5.539 per m (95 % interval 4.318..6.988)` for each parameter.
+std::string parameters_line(const Fit& fit, const std::string& per) {
+    std::string line;
+    const auto names = parameter_names(fit.law.family());
+    for (std::size_t i = 0; i < names.size(); ++i)
+        line +=
+            fmt::format("{}{} {:.4g}{} ({:.0f} % interval {:.4g}..{:.4g})", i > 0 ? ", " : "",
+                        names[i], fit.law.parameters()[i], names[i] == "rate" ? " per " + per : "",
+                        100 * fit.level, fit.intervals[i].lo, fit.intervals[i].hi);
+    return line;
+}
+
+/// How the families compare, and what their choice does to the number of holes.
+void tell_ranking(const LawRanking& ranking, const std::string& per, const Console& console) {
+    std::string line;
+    for (std::size_t i = 0; i < ranking.fits.size(); ++i)
+        line += fmt::format("{}{} {:.2f}", i > 0 ? ", " : "",
+                            family_name(ranking.fits[i].law.family()), ranking.weights[i]);
+    if (ranking.fits.size() > 1)
+        console.say("weights of the laws (Akaike): {}", line);
+    if (ranking.fits.size() > 1 && ranking.n_v)
+        console.say("holes per {}^3 by all of them: {:.4g}, standard deviation {:.4g}", per,
+                    ranking.n_v->mean, ranking.n_v->sd);
+    for (const std::string& note : ranking.notes)
+        console.say_text(note);
+}
+
+void tell(const LawRanking& ranking, const Sample& sample, const Console& console) {
+    const Fit& fit = ranking.fits.front();
     const std::string unit(unit_name(sample.unit));
     const std::string per = unit == "greatest" ? "greatest diameter" : unit;
-    console.say(
-        "exponential: rate {:.4g} per {} ({:.0f} % interval {:.4g}..{:.4g}), mean diameter {:.4g}",
-        fit.law.parameters()[0], per, 100 * fit.level, fit.intervals[0].lo, fit.intervals[0].hi,
-        fit.law.mean());
+    console.say("{}: {}, mean diameter {:.4g}", family_name(fit.law.family()),
+                parameters_line(fit, per), fit.law.mean());
     console.say("{} profiles, detection limit {:.4g}, log-likelihood {:.2f}, AICc {:.1f}",
                 fit.n_profiles, fit.detection_limit, fit.log_likelihood, fit.aicc);
     console.say_text(chi_squared_line(sample, fit));
@@ -78,19 +107,32 @@ void tell(const Fit& fit, const Sample& sample, const Console& console) {
         console.say("holes per volume: unknown, because the area searched is (--area)");
     for (const std::string& note : fit.notes)
         console.say_text(note);
+    tell_ranking(ranking, per, console);
+}
+
+/// `PHOTO=MASK.png`, or `MASK.png` for the only photo.
+PhotoMask parse_mask(const std::string& text) {
+    const std::size_t equals = text.find('=');
+    if (equals == std::string::npos)
+        return {"", text};
+    return {text.substr(0, equals), text.substr(equals + 1)};
 }
 
 void run(FitArgs& args, const Console& console) {
     if (!args.unit.empty())
         args.settings.unit = unit_from_name(args.unit);
+    if (!args.scale_bar.empty())
+        args.settings.scale_bar_m = length_m("--scale-bar", args.scale_bar);
+    for (const std::string& mask : args.masks)
+        args.settings.masks.push_back(parse_mask(mask));
     const Measurements measurements = read_measurements(args.files, args.settings);
     for (const std::string& warning : measurements.warnings)
         console.say_text(warning);
     if (args.method == "thesis")
         return run_thesis(args, measurements, console);
-    const Fit fit = fit_exponential(measurements.sample, args.fit);
-    const std::string law = format_law_file(make_law_file(fit, measurements));
-    tell(fit, measurements.sample, console);
+    const LawRanking ranking = fit_laws(measurements.sample, kUsualFamilies, args.fit);
+    const std::string law = format_law_file(make_law_file(ranking, measurements));
+    tell(ranking, measurements.sample, console);
     if (!args.out.empty()) {
         console.may_write(args.out);
         write_file(args.out, law);
@@ -106,11 +148,13 @@ void add_fit(CLI::App& app, Console& console) {
     auto* verb =
         console.verb(app, "fit", "Fit the law of hole diameters to profiles measured on pictures",
                      "  taihu fit rock1.csv -o law.json\n"
+                     "  taihu fit rock1.json rock2.json --scale-bar 0.5m -o law.json\n"
                      "  taihu fit segments.csv --area 1.2 --detection-limit 0.02 -o law.json\n"
                      "  taihu fit data/measurements/rock1.csv --method thesis");
     verb->add_option("files", args->files,
                      "Tables: diameter; diameter_lo,diameter_hi,count; or segments "
-                     "image,label,x1,y1,x2,y2,unit_per_px")
+                     "image,label,x1,y1,x2,y2,unit_per_px; segments of labelme, VIA, ImageJ (.roi, "
+                     "zip, results) or CVAT")
         ->required();
     verb->add_option("-o,--output", args->out, "Where to write the law (.json)");
     verb->add_option(
@@ -122,6 +166,13 @@ void add_fit(CLI::App& app, Console& console) {
                      "Unit of the lengths: m, px or greatest [what the file says]");
     verb->add_option("--scale", args->settings.unit_per_px,
                      "Length of a pixel, for segments that have none [unit/px]");
+    verb->add_option("--scale-bar", args->scale_bar,
+                     "Length of what the segments labelled 'scale' were drawn along: 0.5m, 20cm");
+    verb->add_option("--label", args->settings.label,
+                     "Only segments with this label are holes [all but 'scale']");
+    verb->add_option("--mask", args->masks,
+                     "What was searched of a photo, as PNG, bright there: PHOTO=MASK.png, or "
+                     "MASK.png for the only photo [all of it, where its size is known]");
     verb->add_option("--area", args->settings.area, "Area searched in all files together [unit^2]");
     verb->add_option("--detection-limit", args->settings.detection_limit,
                      "Nothing smaller was marked [unit; the smallest marked]");

@@ -13,6 +13,9 @@ namespace {
 
 using nlohmann::json;
 
+// One takes up to 100 bytes of memory however few bytes of text it has.
+constexpr std::size_t kMostValues = 8'000'000;
+
 [[noreturn]] void refuse(const std::string& where, const std::string& what) {
     throw Error(Fault::bad_input, where + ": " + what);
 }
@@ -58,8 +61,12 @@ void check_nesting(std::string_view text, std::string_view where, std::size_t ma
         std::set<std::string> keys;
     };
     std::vector<Level> levels;
+    std::size_t n_values = 0;
     for (std::size_t i = 0; i < text.size();) {
         const char c = text[i];
+        if ((c == '{' || c == '[' || c == ',') && ++n_values > kMostValues)
+            refuse(std::string(where),
+                   "more than " + std::to_string(kMostValues) + " values; split the file");
         if (c == '{' || c == '[') {
             if (levels.size() == max_depth)
                 refuse(place(where, text, i),

@@ -11,8 +11,9 @@ namespace taihu {
 /// JSON text as values. Stricter than the grammar: no object may have a key twice.
 ///
 /// \param where  the file's base name; messages begin `where:line:column: `.
-/// \throws Error bad_input: more than `max_bytes`, nested deeper than `max_depth`, a key twice, not
-///         JSON, invalid UTF-8, a number outside of the range of a double.
+/// \throws Error bad_input: more than `max_bytes` or 8 million values, nested deeper than
+///         `max_depth`, a key twice, not JSON, invalid UTF-8, a number outside of the range of a
+///         double.
 nlohmann::json parse_json(std::string_view text, std::string_view where,
                           std::size_t max_bytes = std::size_t{64} << 20,
                           std::size_t max_depth = 64);

@@ -257,7 +257,13 @@ void check_version(const json& root, const std::string& where) {
 
 } // namespace
 
-LawFile make_law_file(const Fit& fit, const Measurements& measurements) {
+LawFile make_law_file(const LawRanking& ranking, const Measurements& measurements) {
+    if (ranking.fits.empty() || ranking.weights.size() != ranking.fits.size())
+        throw Error(Fault::bad_argument, "law file: the ranking has " +
+                                             std::to_string(ranking.fits.size()) + " fits and " +
+                                             std::to_string(ranking.weights.size()) +
+                                             " weights; fit a law first");
+    const Fit& fit = ranking.fits.front();
     LawFile file;
     file.law = fit.law;
     file.unit = measurements.sample.unit;
@@ -266,8 +272,10 @@ LawFile make_law_file(const Fit& fit, const Measurements& measurements) {
     file.n_v = fit.n_v;
     file.detection_limit = fit.detection_limit;
     file.n_profiles = fit.n_profiles;
-    file.area = measurements.sample.area;
-    file.ranking = {{fit.law.family(), fit.aicc, 1}};
+    file.area = searched_area(measurements.sample);
+    for (std::size_t i = 0; i < ranking.fits.size(); ++i)
+        file.ranking.push_back({ranking.fits[i].law.family(), ranking.fits[i].aicc,
+                                std::min(1.0, ranking.weights[i])});
     file.source = measurements.sources;
     return file;
 }

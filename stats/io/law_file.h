@@ -38,8 +38,9 @@ struct LawFile {
     friend bool operator==(const LawFile&, const LawFile&) = default;
 };
 
-/// A fit and what it was made from. The ranking has the one family that was fitted.
-LawFile make_law_file(const Fit& fit, const Measurements& measurements);
+/// The best of the fits, the ranking of all, and what they were made from.
+/// \throws Error bad_argument: a ranking without fits.
+LawFile make_law_file(const LawRanking& ranking, const Measurements& measurements);
 
 /// The JSON text: keys in the order of the struct, `mean_diameter` from the law, numbers the
 /// shortest that read back exactly; the same bytes everywhere. \throws Error bad_argument: numbers

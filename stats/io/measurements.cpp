@@ -4,20 +4,26 @@
 #include <array>
 #include <cmath>
 #include <string_view>
-#include <tuple>
 #include <utility>
 
 #include "stats/core/error.h"
 #include "stats/core/file.h"
 #include "stats/core/sha256.h"
 #include "stats/core/text.h"
+#include "stats/io/cvat_file_detail.h"
+#include "stats/io/imagej_file_detail.h"
+#include "stats/io/json_detail.h"
+#include "stats/io/labelme_file_detail.h"
+#include "stats/io/photo_pool_detail.h"
 #include "stats/io/table_detail.h"
+#include "stats/io/via_file_detail.h"
 #include "stats/number_detail.h"
 
 namespace taihu {
 namespace {
 
 constexpr std::uint64_t kFewestProfiles = 8;
+constexpr std::size_t kMostBytes = std::size_t{256} << 20;
 
 enum class Kind { plain, binned, segments, profiles };
 
@@ -33,20 +39,45 @@ const std::vector<Format>& formats() {
         {Kind::segments,
          "x1",
          {"image", "label", "x1", "y1", "x2", "y2", "unit_per_px"},
-         {"minor"}},
+         {"minor", "width_px", "height_px"}},
         {Kind::profiles, "diameter_m", {"plane", "u_m", "v_m", "diameter_m"}, {}},
         {Kind::plain, "diameter", {"diameter"}, {}}};
     return kFormats;
 }
 
+// Chinese names of columns, for people who head their tables so.
+constexpr std::array kAliases = std::to_array<Table::Alias>({
+    {"图像", "image"},
+    {"图片", "image"},
+    {"照片", "image"},
+    {"标签", "label"},
+    {"类别", "label"},
+    {"直径", "diameter"},
+    {"直径下限", "diameter_lo"},
+    {"直径上限", "diameter_hi"},
+    {"数量", "count"},
+    {"个数", "count"},
+    {"起点x", "x1"},
+    {"起点y", "y1"},
+    {"终点x", "x2"},
+    {"终点y", "y2"},
+    {"起点X", "x1"},
+    {"起点Y", "y1"},
+    {"终点X", "x2"},
+    {"终点Y", "y2"},
+    {"每像素长度", "unit_per_px"},
+    {"短轴", "minor"},
+    {"图像宽度", "width_px"},
+    {"图像高度", "height_px"},
+});
+
 // What one file says, before files are joined.
 struct Part {
-    Kind kind;
+    Kind kind = Kind::segments;
     std::string name;
     std::vector<double> diameters;
     std::vector<Bin> bins;
-    std::vector<Segment> segments;
-    bool scaled = false; ///< segments with a unit_per_px other than 1
+    std::optional<Annotations> annotations; ///< of segments
     std::optional<LengthUnit> unit;
     std::optional<double> area;
 };
@@ -85,7 +116,7 @@ void read_comments(const Table& table, Part& part, std::vector<std::string>& war
                 table.refuse_line(comment.line, e.what());
             }
         } else if (comment.key == area_key) {
-            const auto area = parse_number(comment.value);
+            const auto area = table.parse(comment.value);
             if (part.area)
                 table.refuse_line(comment.line, "'" + key + "' is there twice; keep one of them");
             if (!area || !(*area > 0))
@@ -129,90 +160,75 @@ void read_bins(const Table& table, Part& part) {
     }
 }
 
-// The scale of a row, or nothing when neither the row nor the setting has one.
-std::optional<double> row_scale(const Table& table, std::size_t row, std::size_t column,
-                                const MeasurementSettings& settings) {
-    if (table.cell(row, column).empty())
-        return settings.unit_per_px;
-    const double scale = table.number(row, column);
-    if (!(scale > 0))
-        table.refuse(row, column, "must be > 0, or empty when it is not known");
-    return scale;
+// A cell that may be empty, and else holds a number > 0.
+std::optional<double> optional_cell(const Table& table, std::size_t row,
+                                    std::optional<std::size_t> column) {
+    if (!column || table.cell(row, *column).empty())
+        return std::nullopt;
+    const double value = table.number(row, *column);
+    if (!(value > 0))
+        table.refuse(row, *column, "must be > 0, or empty when it is not known");
+    return value;
 }
 
-void read_segments(const Table& table, const MeasurementSettings& settings, Part& part) {
+int side_cell(const Table& table, std::size_t row, std::optional<std::size_t> column) {
+    const auto value = optional_cell(table, row, column);
+    const auto side = value ? picture_side(*value) : std::nullopt;
+    if (value && !side)
+        table.refuse(row, *column, "must be a whole number in 1..1000000");
+    return side.value_or(0);
+}
+
+Annotations read_segments(const Table& table, const std::string& name) {
     const std::array<std::size_t, 4> ends = {table.column("x1"), table.column("y1"),
                                              table.column("x2"), table.column("y2")};
     const auto image = table.column("image"), label = table.column("label"),
                per_px = table.column("unit_per_px");
-    const auto minor = table.find("minor");
-    std::optional<bool> all_known;
+    const auto minor = table.find("minor"), width = table.find("width_px"),
+               height = table.find("height_px");
+    Annotations result;
+    result.file = name;
     for (std::size_t row = 0; row < table.n_rows(); ++row) {
-        Segment s{std::string(table.cell(row, image)),
-                  std::string(table.cell(row, label)),
-                  table.number(row, ends[0]),
-                  table.number(row, ends[1]),
-                  table.number(row, ends[2]),
-                  table.number(row, ends[3]),
-                  0,
-                  {},
-                  table.line(row)};
-        const double length_px = std::hypot(s.x2 - s.x1, s.y2 - s.y1);
-        if (!(length_px > 0 && std::isfinite(length_px)))
-            table.refuse_line(s.line, "the segment has length " + shortest(length_px) +
-                                          "; drop the row or fix its ends");
-        const auto scale = row_scale(table, row, per_px, settings);
-        if (all_known.value_or(scale.has_value()) != scale.has_value())
-            table.refuse(row, per_px, "some rows have a scale and some have none; fill in all");
-        all_known = scale.has_value();
-        part.scaled = part.scaled || scale.value_or(1) != 1;
-        s.diameter = length_px * scale.value_or(1);
-        if (minor && !table.cell(row, *minor).empty()) {
-            s.minor_px = table.number(row, *minor);
-            if (!(*s.minor_px > 0 && *s.minor_px <= length_px))
-                table.refuse(row, *minor,
-                             "must be > 0 and at most the segment's length, " +
-                                 shortest(length_px));
-        }
-        part.diameters.push_back(s.diameter);
-        part.segments.push_back(std::move(s));
+        Mark m;
+        m.photo = result.photo(std::string(table.cell(row, image)));
+        m.label = table.cell(row, label);
+        m.x1 = table.number(row, ends[0]);
+        m.y1 = table.number(row, ends[1]);
+        m.x2 = table.number(row, ends[2]);
+        m.y2 = table.number(row, ends[3]);
+        m.line = table.line(row);
+        m.unit_per_px = optional_cell(table, row, per_px);
+        m.minor_px = optional_cell(table, row, minor);
+        const double length_px = std::hypot(m.x2 - m.x1, m.y2 - m.y1);
+        if (m.minor_px && *m.minor_px > length_px)
+            table.refuse(row, *minor,
+                         "must be > 0 and at most the segment's length, " + shortest(length_px));
+        const int w = side_cell(table, row, width), h = side_cell(table, row, height);
+        if ((w == 0) != (h == 0))
+            table.refuse_line(m.line, "only one of width_px and height_px is there; give both");
+        result.set_size(m.photo, w, h);
+        result.marks.push_back(std::move(m));
     }
-    if (part.unit == LengthUnit::metre && all_known == false)
-        table.refuse_line(0, "unit is m but unit_per_px is empty; give the metres of a pixel");
+    return result;
 }
 
-void warn_of_duplicates(const Part& part, std::vector<std::string>& warnings) {
-    using Key = std::tuple<std::string_view, std::pair<double, double>, std::pair<double, double>>;
-    std::vector<std::pair<Key, std::size_t>> keys;
-    for (const Segment& s : part.segments) {
-        const std::pair a{s.x1, s.y1}, b{s.x2, s.y2};
-        keys.push_back({Key{s.image, std::min(a, b), std::max(a, b)}, s.line});
-    }
-    std::sort(keys.begin(), keys.end());
-    for (std::size_t i = 1; i < keys.size(); ++i)
-        if (keys[i].first == keys[i - 1].first)
-            warnings.push_back(part.name + ":" + std::to_string(keys[i].second) +
-                               ": the same segment as on line " +
-                               std::to_string(keys[i - 1].second) + "; it is counted twice");
+void take_unit(const MeasurementSettings& settings, Part& part) {
+    if (settings.unit && part.unit && *settings.unit != *part.unit)
+        throw Error(Fault::bad_input,
+                    part.name + ": unit is " + std::string(unit_name(*part.unit)) + ", not " +
+                        std::string(unit_name(*settings.unit)) + " as asked for; drop one of them");
+    if (settings.unit)
+        part.unit = settings.unit;
 }
 
-Part read_part(const std::filesystem::path& path, const MeasurementSettings& settings,
-               Measurements& result) {
-    const std::string text = read_file(path, std::size_t{256} << 20);
-    Part part{};
-    part.name = base_name(path);
-    result.sources.push_back({part.name, sha256_hex(text)});
-    const Table table(text, part.name);
+void read_own_table(Table& table, const MeasurementSettings& settings, Part& part,
+                    std::vector<std::string>& warnings) {
+    table.rename(kAliases);
     part.kind = recognise(table).kind;
     if (part.kind == Kind::profiles)
         part.unit = LengthUnit::metre;
-    read_comments(table, part, result.warnings);
-    if (settings.unit && part.unit && *settings.unit != *part.unit)
-        table.refuse_line(0, "unit is " + std::string(unit_name(*part.unit)) + ", not " +
-                                 std::string(unit_name(*settings.unit)) +
-                                 " as asked for; drop one of them");
-    if (settings.unit)
-        part.unit = settings.unit;
+    read_comments(table, part, warnings);
+    take_unit(settings, part);
     switch (part.kind) {
     case Kind::plain:
         read_plain(table, "diameter", part);
@@ -224,19 +240,99 @@ Part read_part(const std::filesystem::path& path, const MeasurementSettings& set
         read_bins(table, part);
         break;
     case Kind::segments:
-        read_segments(table, settings, part);
-        warn_of_duplicates(part, result.warnings);
-        if (!part.unit && !part.scaled)
-            part.unit = LengthUnit::pixel;
+        part.annotations = read_segments(table, part.name);
         if (part.unit == LengthUnit::greatest && (part.area || settings.area))
             table.refuse_line(0, "an area has no unit when segments are scaled to the greatest; "
                                  "use unit=px or leave the area out");
-        break;
+        return;
     }
     if (!part.unit)
         table.refuse_line(0, "the unit of the lengths is not said; add a line '# unit=m', "
                              "'# unit=px' or '# unit=greatest'");
+}
+
+Annotations read_json_annotations(std::string_view text, const std::string& name) {
+    // labelme may keep the photo itself in its file.
+    const nlohmann::json file = parse_json(text, name, kMostBytes);
+    if (is_labelme(file))
+        return read_labelme(file, name);
+    if (is_via(file))
+        return read_via(file, name);
+    throw Error(Fault::bad_input, name + ": is JSON, but neither of labelme nor of VIA; save the "
+                                         "segments in one of their formats or as CSV");
+}
+
+bool is_results_table(const Table& table) {
+    return table.find("Length") || table.header()[0].empty();
+}
+
+void refuse_roi_list(const Table& table) {
+    if (table.find("Name") && table.find("Type") && table.find("LWidth"))
+        table.refuse_line(0, "is the list of ImageJ's ROI Manager, which has no ends; save the "
+                             "ROIs themselves (More, Save) or the results of Measure");
+}
+
+// What the first bytes and the header say decides; names of files may lie.
+Part read_part(const std::filesystem::path& path, const MeasurementSettings& settings,
+               Measurements& result) {
+    const std::string bytes = read_file(path, kMostBytes);
+    Part part;
+    part.name = base_name(path);
+    result.sources.push_back({part.name, sha256_hex(bytes)});
+    std::string_view text = bytes;
+    if (text.starts_with("\xef\xbb\xbf"))
+        text.remove_prefix(3);
+    const std::size_t first = text.find_first_not_of(" \t\r\n");
+    const char begin = first == std::string_view::npos ? '\0' : text[first];
+    if (is_imagej_roi(text)) {
+        part.annotations = read_imagej_roi(text, part.name);
+    } else if (is_zip(text)) {
+        part.annotations = read_imagej_zip(text, part.name);
+    } else if (begin == '{' || begin == '[') {
+        part.annotations = read_json_annotations(text, part.name);
+    } else if (begin == '<') {
+        part.annotations = read_cvat(text, part.name);
+    } else {
+        Table table(bytes, part.name);
+        refuse_roi_list(table);
+        if (table.find(kViaShapeColumn))
+            part.annotations = read_via_table(table, part.name);
+        else if (is_results_table(table))
+            part.annotations = read_imagej_results(table, part.name);
+        else
+            read_own_table(table, settings, part, result.warnings);
+    }
+    if (part.annotations) {
+        take_unit(settings, part);
+        if (part.unit == LengthUnit::greatest && settings.area)
+            throw Error(Fault::bad_argument,
+                        "area: has no unit when segments are scaled to the greatest; use unit px "
+                        "or leave the area out");
+        part.annotations->unit = part.unit;
+    }
     return part;
+}
+
+// Segments of all files at once, because photos may be spread over files.
+std::vector<std::optional<Image>>
+join_segments(std::vector<Part>& parts, const MeasurementSettings& settings, Measurements& result) {
+    std::vector<Annotations> files;
+    for (Part& part : parts)
+        if (part.annotations)
+            files.push_back(std::move(*part.annotations));
+    if (files.empty() && (settings.scale_bar_m || settings.label || !settings.masks.empty()))
+        throw Error(Fault::bad_argument, "measurements: a scale bar, a label or a mask, but no "
+                                         "file has segments; drop these settings");
+    PhotoPool pool = pool_photos(files, settings, result.warnings);
+    std::size_t f = 0;
+    for (Part& part : parts)
+        if (part.annotations)
+            part.unit = pool.units[f++];
+    for (const Segment& s : pool.segments)
+        result.sample.diameters.push_back(s.diameter);
+    result.segments = std::move(pool.segments);
+    result.photos = std::move(pool.photos);
+    return std::move(pool.masks);
 }
 
 void join(const Part& part, bool first, Measurements& result) {
@@ -264,7 +360,6 @@ void join(const Part& part, bool first, Measurements& result) {
     if (part.area)
         sample.area = sample.area.value_or(0) + *part.area;
     sample.diameters.insert(sample.diameters.end(), part.diameters.begin(), part.diameters.end());
-    result.segments.insert(result.segments.end(), part.segments.begin(), part.segments.end());
 }
 
 // E[minor / major] is how much the picture shortens the surface.
@@ -277,7 +372,32 @@ void straighten_area(Measurements& result) {
             return;
         ratios += *s.minor_px / std::hypot(s.x2 - s.x1, s.y2 - s.y1);
     }
-    *result.sample.area *= static_cast<double>(result.segments.size()) / ratios;
+    const double stretch = static_cast<double>(result.segments.size()) / ratios;
+    *result.sample.area *= stretch;
+    for (Frame& frame : result.sample.frames)
+        frame.area *= stretch;
+}
+
+// Lengths are final by now. A given area has no parts, so it makes no frames.
+void add_windows(const std::vector<std::optional<Image>>& masks, Measurements& result) {
+    for (std::size_t i = 0; i < result.photos.size(); ++i) {
+        Photo& photo = result.photos[i];
+        if (masks[i])
+            photo.window = Window::mask(*masks[i], photo.unit_per_px);
+        else if (photo.width_px > 0)
+            photo.window = Window::rectangle(photo.width_px * photo.unit_per_px,
+                                             photo.height_px * photo.unit_per_px);
+    }
+    // Profiles from other tables lie on no photo, so photos are not all that was searched.
+    if (result.sample.area || result.segments.size() != n_profiles(result.sample) ||
+        !std::all_of(result.photos.begin(), result.photos.end(),
+                     [](const Photo& p) { return p.window.has_value(); }))
+        return;
+    result.sample.area = 0;
+    for (const Photo& photo : result.photos) {
+        result.sample.frames.push_back({photo.window->area(), {}, photo.window});
+        *result.sample.area += photo.window->area();
+    }
 }
 
 void scale_to_greatest(Measurements& result) {
@@ -289,6 +409,8 @@ void scale_to_greatest(Measurements& result) {
                             : 1;
     for (Segment& s : result.segments)
         s.diameter /= greatest;
+    for (Photo& photo : result.photos)
+        photo.unit_per_px /= greatest;
     if (!result.segments.empty())
         for (double& d : sample.diameters)
             d /= greatest;
@@ -311,6 +433,13 @@ void check_settings(const MeasurementSettings& settings) {
     check("unit_per_px", settings.unit_per_px, false);
     check("area", settings.area, false);
     check("detection limit", settings.detection_limit, true);
+    check("scale bar", settings.scale_bar_m, false);
+    if (settings.scale_bar_m && settings.unit == LengthUnit::pixel)
+        throw Error(Fault::bad_argument, "measurements: a scale bar gives metres but unit is px; "
+                                         "drop one of them");
+    if (settings.label == "scale")
+        throw Error(Fault::bad_argument, "measurements: label is 'scale', which names scale bars "
+                                         "and never holes; use another");
 }
 
 } // namespace
@@ -321,8 +450,12 @@ Measurements read_measurements(std::span<const std::filesystem::path> paths,
     if (paths.empty())
         throw Error(Fault::bad_argument, "measurements: no files; give at least one");
     Measurements result;
-    for (std::size_t i = 0; i < paths.size(); ++i)
-        join(read_part(paths[i], settings, result), i == 0, result);
+    std::vector<Part> parts;
+    for (const std::filesystem::path& path : paths)
+        parts.push_back(read_part(path, settings, result));
+    const auto masks = join_segments(parts, settings, result);
+    for (std::size_t i = 0; i < parts.size(); ++i)
+        join(parts[i], i == 0, result);
     if (settings.area)
         result.sample.area = settings.area;
     result.sample.detection_limit = settings.detection_limit;
@@ -330,8 +463,9 @@ Measurements read_measurements(std::span<const std::filesystem::path> paths,
     if (n < kFewestProfiles)
         throw Error(Fault::bad_input, result.sources.back().name + ": " + std::to_string(n) +
                                           " profiles; at least 8 are needed, mark more holes");
-    straighten_area(result);
     scale_to_greatest(result);
+    add_windows(masks, result);
+    straighten_area(result);
     check_sample(result.sample);
     return result;
 }

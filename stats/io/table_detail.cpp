@@ -1,26 +1,46 @@
 #include "stats/io/table_detail.h"
 
 #include <algorithm>
+#include <set>
 #include <utility>
 
 #include "stats/core/error.h"
 #include "stats/core/text.h"
+#include "stats/io/utf_detail.h"
 
 namespace taihu {
 
+namespace {
+
+// What separates the cells of a header; what stands in quotes separates nothing.
+char separator_of(std::string_view header) {
+    char found = ',';
+    bool quoted = false;
+    for (const char c : header) {
+        quoted ^= c == '"';
+        if (!quoted && (c == '\t' || (c == ';' && found == ',')))
+            found = c;
+    }
+    return found;
+}
+
+} // namespace
+
 Table::Table(std::string_view text, std::string where) : where_(std::move(where)) {
-    if (text.starts_with("\xff\xfe") || text.starts_with("\xfe\xff"))
-        refuse_line(0, "is UTF-16 text; save it as UTF-8");
-    if (text.starts_with("\xef\xbb\xbf"))
-        text.remove_prefix(3);
+    text = decoded(text);
+    if (text.starts_with("#filename,")) // the header of VIA 1 looks like a comment
+        text.remove_prefix(1);
     for (std::size_t line = 1; !text.empty(); ++line) {
         const std::size_t end = std::min(text.find('\n'), text.size());
-        const std::string_view row = trimmed(text.substr(0, end));
+        std::string_view row = text.substr(0, end);
         text.remove_prefix(std::min(end + 1, text.size()));
-        if (row.empty())
+        if (row.ends_with('\r'))
+            row.remove_suffix(1);
+        const std::string_view words = trimmed(row);
+        if (words.empty())
             continue;
-        if (row.starts_with('#'))
-            add_comment(row.substr(1), line);
+        if (words.starts_with('#'))
+            add_comment(words.substr(1), line);
         else
             add_row(row, line);
     }
@@ -28,7 +48,25 @@ Table::Table(std::string_view text, std::string where) : where_(std::move(where)
         refuse_line(0, "has no header line; the first line must name the columns");
 }
 
+// The text as UTF-8 without its mark.
+std::string_view Table::decoded(std::string_view text) {
+    const bool little = text.starts_with("\xff\xfe"), big = text.starts_with("\xfe\xff");
+    if (little || big) {
+        auto utf8 = utf8_from_utf16(text.substr(2), big);
+        if (!utf8)
+            refuse_line(0, "is damaged UTF-16 text; save it as UTF-8");
+        return unquoted_.emplace_back(std::move(*utf8));
+    }
+    if (text.starts_with("\xef\xbb\xbf"))
+        text.remove_prefix(3);
+    if (!is_utf8(text))
+        refuse_line(0, "is not UTF-8 text; save it as UTF-8, in a spreadsheet as 'CSV UTF-8'");
+    return text;
+}
+
 void Table::add_comment(std::string_view text, std::size_t line) {
+    // A spreadsheet fills a comment up with empty cells.
+    text = text.substr(0, text.find_last_not_of(",;\t ") + 1);
     const std::size_t equals = text.find('=');
     const std::string_view key = trimmed(text.substr(0, equals));
     const bool is_setting = equals != std::string_view::npos && !key.empty() &&
@@ -39,18 +77,27 @@ void Table::add_comment(std::string_view text, std::size_t line) {
         comments_.push_back({line, {}, trimmed(text)});
 }
 
+void Table::check_names(std::size_t line) const {
+    std::set<std::string_view> names;
+    for (std::size_t i = 0; i < header_.size(); ++i) {
+        if (header_[i].empty() && i > 0)
+            refuse_line(line, "column " + std::to_string(i + 1) + " has no name; name it");
+        if (!names.insert(header_[i]).second)
+            refuse_line(line, "column " + std::to_string(i + 1) + " '" + printable(header_[i]) +
+                                  "' is there twice; keep one of them");
+    }
+}
+
 void Table::add_row(std::string_view text, std::size_t line) {
+    if (header_.empty())
+        separator_ = separator_of(text);
     const auto cells = split(text, line);
+    const bool blank = std::all_of(cells.begin(), cells.end(), [](auto c) { return c.empty(); });
+    if (blank && cells.size() > 1)
+        return;
     if (header_.empty()) {
-        for (std::size_t i = 0; i < cells.size(); ++i) {
-            if (cells[i].empty())
-                refuse_line(line, "column " + std::to_string(i + 1) + " has no name; name it");
-            if (std::find(cells.begin(), cells.begin() + static_cast<std::ptrdiff_t>(i),
-                          cells[i]) != cells.begin() + static_cast<std::ptrdiff_t>(i))
-                refuse_line(line, "column " + std::to_string(i + 1) + " '" + printable(cells[i]) +
-                                      "' is there twice; keep one of them");
-        }
         header_ = cells;
+        check_names(line);
         return;
     }
     if (cells.size() != header_.size())
@@ -60,24 +107,33 @@ void Table::add_row(std::string_view text, std::size_t line) {
     lines_.push_back(line);
 }
 
+void Table::rename(std::span<const Alias> aliases) {
+    for (std::string_view& name : header_)
+        for (const Alias& alias : aliases)
+            if (name == alias.alias)
+                name = alias.name;
+    check_names(0);
+}
+
 std::vector<std::string_view> Table::split(std::string_view text, std::size_t line) {
     std::vector<std::string_view> cells;
     while (true) {
-        text = text.substr(std::min(text.find_first_not_of(" \t"), text.size()));
+        const char* blanks = separator_ == '\t' ? " " : " \t";
+        text = text.substr(std::min(text.find_first_not_of(blanks), text.size()));
         if (text.starts_with('"')) {
             cells.push_back(quoted_cell(text, line));
         } else {
-            const std::size_t end = std::min(text.find(','), text.size());
+            const std::size_t end = std::min(text.find(separator_), text.size());
             cells.push_back(trimmed(text.substr(0, end)));
             text.remove_prefix(end);
         }
         if (text.empty())
             return cells;
-        text.remove_prefix(1); // the comma
+        text.remove_prefix(1); // the separator
     }
 }
 
-// The cell whose opening quote begins `rest`; `rest` then begins with a comma or is empty.
+// The cell whose opening quote begins `rest`; `rest` then begins with a separator or is empty.
 std::string_view Table::quoted_cell(std::string_view& rest, std::size_t line) {
     std::string cell;
     std::size_t at = 1;
@@ -92,8 +148,8 @@ std::string_view Table::quoted_cell(std::string_view& rest, std::size_t line) {
         cell += '"';
         ++at;
     }
-    rest = rest.substr(std::min(rest.find_first_not_of(" \t", at), rest.size()));
-    if (!rest.empty() && rest[0] != ',')
+    rest = rest.substr(std::min(rest.find_first_not_of(' ', at), rest.size()));
+    if (!rest.empty() && rest[0] != separator_)
         refuse_line(line, "text behind a closing quote; write a quote inside of quotes as \"\"");
     return unquoted_.emplace_back(std::move(cell));
 }
@@ -115,17 +171,24 @@ std::size_t Table::column(std::string_view name) const {
 void Table::check_header(std::span<const std::string_view> known) const {
     for (const std::string_view name : header_)
         if (std::find(known.begin(), known.end(), name) == known.end())
-            refuse_line(0, "unknown column '" + printable(name) + "'" +
-                               (name.find_first_of(";\t") != std::string_view::npos
-                                    ? "; separate columns by commas"
-                                    : did_you_mean(name, known)));
+            refuse_line(0, "unknown column '" + printable(name) + "'" + did_you_mean(name, known));
 }
 
 double Table::number(std::size_t row, std::size_t column) const {
-    const auto value = parse_number(cell(row, column));
+    const auto value = parse(cell(row, column));
     if (!value)
         refuse(row, column, "must be a finite number");
     return *value;
+}
+
+std::optional<double> Table::parse(std::string_view text) const {
+    const std::size_t comma = text.find(',');
+    if (separator_ == ',' || comma == std::string_view::npos ||
+        text.find('.') != std::string_view::npos)
+        return parse_number(text);
+    std::string with_point(text);
+    with_point[comma] = '.';
+    return parse_number(with_point);
 }
 
 void Table::refuse(std::size_t row, std::size_t column, const std::string& remedy) const {

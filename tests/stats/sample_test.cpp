@@ -25,6 +25,16 @@ TEST(Sample, CountsBothKinds) {
     EXPECT_EQ(detection_limit(sample), 0.5);
 }
 
+TEST(Sample, JoinsItsFrames) {
+    Sample sample;
+    sample.diameters = {3, 1, 2};
+    EXPECT_FALSE(searched_area(sample));
+    sample.frames = {{2, 0.5, {}}, {3, {}, {}}};
+    EXPECT_EQ(searched_area(sample), 5);
+    EXPECT_EQ(detection_limit(sample), 0.5);
+    EXPECT_EQ(detection_limit(sample, sample.frames[1]), 1);
+}
+
 void expect_refused(const Sample& sample, const char* message) {
     try {
         check_sample(sample);
@@ -65,6 +75,19 @@ TEST(Sample, SaysWhatIsWrongWithIt) {
     Sample negative = with_diameters({1});
     negative.detection_limit = -1;
     expect_refused(negative, "detection limit is -1");
+    Sample framed = with_diameters({1});
+    framed.frames = {{2, {}, {}}, {3, {}, {}}};
+    framed.area = 6;
+    expect_refused(framed, "area is 6 but that of the frames together is 5");
+    framed.area.reset();
+    framed.counting = Counting::whole;
+    expect_refused(framed, "frames[0] has no window");
+    framed.frames.clear();
+    expect_refused(framed, "whole profiles were counted but no window is known");
+    framed.frames = {{0, {}, Window::rectangle(1, 1)}};
+    expect_refused(framed, "frames[0].area is 0");
+    framed.frames = {{1, 2, Window::rectangle(1, 1)}};
+    expect_refused(framed, "detection limit is 2 but the smallest profile is 1");
 }
 
 TEST(LengthUnit, IsFoundByItsName) {

@@ -32,5 +32,16 @@ find_package(draco REQUIRED)
 find_package(OpenEXR REQUIRED)
 find_package(embree 3 REQUIRED)
 find_package(PNG REQUIRED)
+find_package(pugixml REQUIRED)
 find_package(Qhull REQUIRED)
 find_package(Threads REQUIRED)
+
+# Debian's libzip-config.cmake insists on programs that other packages hold.
+if(NOT TARGET libzip::zip)
+  find_library(TAIHU_LIBZIP zip REQUIRED)
+  find_path(TAIHU_LIBZIP_INCLUDE zip.h REQUIRED)
+  add_library(libzip::zip UNKNOWN IMPORTED)
+  set_target_properties(libzip::zip PROPERTIES
+    IMPORTED_LOCATION "${TAIHU_LIBZIP}"
+    INTERFACE_INCLUDE_DIRECTORIES "${TAIHU_LIBZIP_INCLUDE}")
+endif()

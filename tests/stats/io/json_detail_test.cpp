@@ -6,6 +6,7 @@
 #include <gtest/gtest.h>
 
 #include "stats/core/error.h"
+#include "tests/support/errors.h"
 
 namespace taihu {
 namespace {
@@ -101,6 +102,11 @@ TEST(JsonNumber, ChecksKindAndRange) {
 TEST(JsonQuoted, EscapesAndReplaces) {
     EXPECT_EQ(json_quoted("a\"b\n"), "\"a\\\"b\\n\"");
     EXPECT_EQ(json_quoted("\xff"), "\"\xef\xbf\xbd\"");
+}
+
+TEST(ParseJson, RefusesMoreValuesThanMemoryShouldHold) {
+    expect_error(Fault::bad_input, "a.json: more than 8000000 values",
+                 [] { parse_json("[" + std::string(8'000'000, ','), "a.json"); });
 }
 
 } // namespace

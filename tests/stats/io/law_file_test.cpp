@@ -188,13 +188,15 @@ TEST(LawFile, WritesNothingThatItWouldRefuse) {
 TEST(LawFile, CarriesAFit) {
     const std::vector<std::filesystem::path> paths = {TAIHU_DATA "/measurements/rock1.csv"};
     const Measurements measured = read_measurements(paths);
-    const LawFile file = make_law_file(fit_exponential(measured.sample), measured);
+    const LawFile file = make_law_file(fit_laws(measured.sample), measured);
     const LawFile back = parse_law_file(format_law_file(file), "law.json");
     EXPECT_EQ(back, file);
     EXPECT_EQ(back.unit, LengthUnit::greatest);
     EXPECT_EQ(back.n_profiles, 46u);
     EXPECT_EQ(back.detection_limit, 0.1);
     EXPECT_FALSE(back.n_v);
+    ASSERT_EQ(back.ranking.size(), kUsualFamilies.size());
+    EXPECT_EQ(back.ranking.front().family, back.law.family());
     ASSERT_EQ(back.source.size(), 1u);
     EXPECT_EQ(back.source[0].name, "rock1.csv");
 }

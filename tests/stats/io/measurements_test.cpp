@@ -195,6 +195,27 @@ TEST(Measurements, FindTheFormatByTheHeader) {
     EXPECT_THAT(refusal({"image,label\n"}), HasSubstr("the columns make no format"));
 }
 
+TEST(Measurements, ReadChineseHeadersWithDecimalCommas) {
+    std::string text =
+        "\xef\xbb\xbf# unit=m;;;;;;\r\n图像;标签;起点x;起点y;终点x;终点y;每像素长度\r\n";
+    for (int i = 0; i < 8; ++i)
+        text +=
+            "石.jpg;hole;" + std::to_string(i) + ",5;0;" + std::to_string(i + 3) + ",5;4;0,02\r\n";
+    const Measurements m = read_texts({text});
+    EXPECT_EQ(m.segments.at(7).x1, 7.5);
+    EXPECT_EQ(m.segments[7].image, "石.jpg");
+    EXPECT_DOUBLE_EQ(m.sample.diameters[0], 0.1);
+    EXPECT_THAT(refusal({"直径\n1\n-1\n"}), HasSubstr("0.csv:3: column 1 'diameter' is '-1'"));
+}
+
+TEST(Measurements, SayWhatOtherFilesLack) {
+    EXPECT_THAT(refusal({"Index,Name,Type,Group,X,Y,Width,Height,LWidth\n1,a,Line,0,1,2,3,4,0\n"}),
+                HasSubstr("is the list of ImageJ's ROI Manager, which has no ends"));
+    EXPECT_THAT(refusal({"{\"images\":[],\"annotations\":[]}"}),
+                HasSubstr("neither of labelme nor of VIA"));
+    EXPECT_THAT(refusal({""}), HasSubstr("has no header line"));
+}
+
 TEST(Measurements, CheckTheSettings) {
     EXPECT_THAT(
         refusal({kPlain}, {.unit = {}, .unit_per_px = -1, .area = {}, .detection_limit = {}}),

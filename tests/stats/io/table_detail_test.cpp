@@ -6,6 +6,7 @@
 #include <gtest/gtest.h>
 
 #include "stats/core/error.h"
+#include "tests/support/errors.h"
 
 namespace taihu {
 namespace {
@@ -58,18 +59,67 @@ TEST(Table, SaysLineAndColumn) {
     EXPECT_THAT(refusal("count\n1,5"), HasSubstr("t.csv:2: 2 cells"));
     EXPECT_THAT(refusal("count\n0x1p4"), HasSubstr("must be a finite number"));
     EXPECT_EQ(refusal("cuont\n1"), "t.csv: unknown column 'cuont'; did you mean 'count'?");
-    EXPECT_EQ(refusal("count;size\n1;2"),
-              "t.csv: unknown column 'count;size'; separate columns by commas");
+    EXPECT_EQ(refusal("count;size\n1;2"), "accepted");
+    EXPECT_THAT(refusal("count;size\n1,2,3;2"), HasSubstr("column 1 'count' is '1,2,3'"));
     EXPECT_EQ(refusal("size\n1"), "t.csv: column 'count' is missing; add it");
     EXPECT_THAT(refusal("count,count\n1,2"), HasSubstr("t.csv:1: column 2 'count' is there twice"));
     EXPECT_THAT(refusal("count,\n1,2"), HasSubstr("t.csv:1: column 2 has no name"));
     EXPECT_THAT(refusal("count\n\"1\n"), HasSubstr("t.csv:2: a quote is not closed"));
     EXPECT_THAT(refusal("count\n\"1\"2\n"), HasSubstr("t.csv:2: text behind a closing quote"));
     EXPECT_THAT(refusal(std::string("\xff\xfe"
-                                    "c\0",
-                                    4)),
-                HasSubstr("UTF-16"));
+                                    "c\0o",
+                                    5)),
+                HasSubstr("damaged UTF-16"));
+    EXPECT_THAT(refusal("\xd6\xb1\xbe\xb6\n1"), HasSubstr("is not UTF-8 text; save it as UTF-8"));
     EXPECT_THAT(refusal("count\n\x01\n"), HasSubstr("'\\x01'"));
+}
+
+TEST(Table, ReadsWhatSpreadsheetsWrite) {
+    for (const char* separator : {";", "\t"}) {
+        std::string text = "# unit=mS\n\naSb\n1,5S\"-2,25\"\nS\n.5S1e3\n";
+        for (std::size_t at; (at = text.find('S')) != std::string::npos;)
+            text.replace(at, 1, separator);
+        const Table table(text, "t.csv");
+        EXPECT_THAT(table.header(), testing::ElementsAre("a", "b"));
+        ASSERT_EQ(table.n_rows(), 2u); // the row of empty cells is none
+        EXPECT_EQ(table.number(0, 0), 1.5);
+        EXPECT_EQ(table.number(0, 1), -2.25);
+        EXPECT_EQ(table.number(1, 0), 0.5);
+        EXPECT_EQ(table.number(1, 1), 1000);
+        EXPECT_EQ(table.comments()[0].value, "m");
+    }
+}
+
+TEST(Table, ReadsUtf16) {
+    const std::string text = "a,b\n1,\"\xe5\x9b\xbe\"\n"; // the picture sign of Chinese
+    std::string little = "\xff\xfe", big = "\xfe\xff";
+    for (const char16_t unit : std::u16string(u"a,b\n1,\"\u56fe\"\n")) {
+        const auto high = static_cast<char>(unit >> 8), low = static_cast<char>(unit & 0xff);
+        (little += low) += high;
+        (big += high) += low;
+    }
+    for (const std::string& bytes : {text, little, big}) {
+        const Table table(bytes, "t.csv");
+        ASSERT_EQ(table.n_rows(), 1u);
+        EXPECT_EQ(table.number(0, 0), 1);
+        EXPECT_EQ(table.cell(0, 1), "\xe5\x9b\xbe");
+    }
+}
+
+TEST(Table, LetsTheFirstColumnHaveNoName) {
+    const Table table(" \tx\n1\t2\n", "t.csv");
+    EXPECT_THAT(table.header(), testing::ElementsAre("", "x"));
+    EXPECT_EQ(table.number(0, 1), 2);
+}
+
+TEST(Table, RenamesColumns) {
+    constexpr std::array<Table::Alias, 2> kAliases = {{{"dia", "diameter"}, {"d", "diameter"}}};
+    Table table("d,dia2\n1,2\n", "t.csv");
+    table.rename(kAliases);
+    EXPECT_EQ(table.column("diameter"), 0u);
+    Table twice("d,dia\n1,2\n", "t.csv");
+    expect_error(Fault::bad_input, "column 2 'diameter' is there twice",
+                 [&] { twice.rename(kAliases); });
 }
 
 } // namespace

@@ -1,0 +1,67 @@
+#include "stats/boolean_model.h"
+
+#include <cmath>
+#include <numbers>
+
+#include "tests/support/errors.h"
+
+namespace taihu {
+namespace {
+
+constexpr double kPi = std::numbers::pi;
+
+TEST(BooleanModel, ExponentialBallsHaveTheirClosedForms) {
+    const double rate = 3, n = 4, t = kPi * n / (rate * rate * rate), q = std::exp(-t);
+    const BooleanModel m = boolean_model(Law::exponential(rate), n);
+    // Closed forms of the same expressions: rounding alone.
+    EXPECT_NEAR(m.porosity, 1 - q, 1e-14);
+    EXPECT_NEAR(m.s_v, 2 * kPi * n / (rate * rate) * q, 1e-13);
+    EXPECT_NEAR(m.chi_v, n * q * (1 - t + kPi * kPi * t * t / 48), 1e-13);
+    EXPECT_NEAR(m.n_a, n / rate, 1e-14);
+    EXPECT_NEAR(m.n_a_seen, q * n / rate, 1e-14);
+    EXPECT_EQ(m.a_a, m.porosity);
+    EXPECT_NEAR(m.l_a, kPi / 4 * m.s_v, 1e-14);
+}
+
+TEST(BooleanModel, EqualBallsHaveTheirClosedForms) {
+    const double r = 0.4, n = 1.5, h = 4.0 / 3 * kPi * r * r * r * n, q = std::exp(-h);
+    const BooleanModel m = boolean_model(Law::constant(2 * r), n);
+    EXPECT_NEAR(m.porosity, 1 - q, 1e-14);
+    EXPECT_NEAR(m.s_v, 4 * kPi * r * r * n * q, 1e-13);
+    EXPECT_NEAR(m.chi_v, n * q * (1 - 3 * h + 3 * kPi * kPi * h * h / 32), 1e-13);
+    const double ed = 2 * r, ed2 = 4 * r * r;
+    EXPECT_NEAR(m.chi_a, q * (n * ed - std::pow(kPi, 3) / 64 * std::pow(n * ed2, 2)), 1e-13);
+}
+
+TEST(BooleanModel, BallsFarApartKeepTheirOwnNumbers) {
+    const Law ball = Law::constant(1);
+    const BooleanModel sparse = boolean_model(ball, 1e-9);
+    EXPECT_NEAR(sparse.chi_v, 1e-9, 1e-17); // what overlaps is of order n_v^2
+    EXPECT_NEAR(sparse.m_v, 2 * kPi * 1e-9, 1e-16);
+    EXPECT_EQ(boolean_model(ball, 0).porosity, 0);
+}
+
+TEST(BooleanModel, OverlapCorrectionTurnsSeenIntoAll) {
+    const BooleanModel m = boolean_model(Law::exponential(2), 3);
+    EXPECT_NEAR(overlap_corrected_n_a(m.n_a_seen, m.a_a), m.n_a, 1e-14);
+}
+
+TEST(BooleanModel, EqualBallsMakeASpongeAt31Percent) {
+    for (const double d : {0.01, 1.0, 30.0}) {
+        const double porosity = *sponge_porosity(Law::constant(d));
+        EXPECT_NEAR(porosity, 1 - std::exp(-0.3772), 1e-4); // the root of 1 - 3 n + 3 pi^2 n^2 / 32
+        const double n = -std::log(1 - porosity) / (kPi / 6 * d * d * d);
+        EXPECT_NEAR(boolean_model(Law::constant(d), n).chi_v / n, 0, 1e-14);
+    }
+    EXPECT_NEAR(*sponge_porosity(Law::exponential(7)), 0.755, 1e-3);
+    const double broad[] = {0.0, 1.5};
+    EXPECT_FALSE(sponge_porosity(Law(Family::lognormal, broad)));
+}
+
+TEST(BooleanModel, RefusesByName) {
+    expect_error(Fault::bad_argument, "n_v is -1", [] { boolean_model(Law::exponential(1), -1); });
+    expect_error(Fault::bad_argument, "a share 1 of holes", [] { overlap_corrected_n_a(3, 1); });
+}
+
+} // namespace
+} // namespace taihu
