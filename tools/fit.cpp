@@ -81,6 +81,12 @@ void tell(const Fit& fit, const Sample& sample, const Console& console) {
 }
 
 void run(FitArgs& args, const Console& console) {
+    if (!args.out.empty()) {
+        if (args.out.extension() != ".json")
+            throw Error(Fault::unsupported, args.out.string() + ": a law is a .json; name one");
+        for (const auto& file : args.files)
+            console.may_write(args.out, {file});
+    }
     if (!args.unit.empty())
         args.settings.unit = unit_from_name(args.unit);
     const Measurements measurements = read_measurements(args.files, args.settings);
@@ -92,7 +98,6 @@ void run(FitArgs& args, const Console& console) {
     const std::string law = format_law_file(make_law_file(fit, measurements));
     tell(fit, measurements.sample, console);
     if (!args.out.empty()) {
-        console.may_write(args.out);
         write_file(args.out, law);
         console.say("{}: the law", args.out.string());
     }
@@ -128,7 +133,7 @@ void add_fit(CLI::App& app, Console& console) {
     verb->add_option("--level", args->fit.level, "Of the intervals, 0.5..0.9999")
         ->check(CLI::Range(0.5, 0.9999))
         ->capture_default_str();
-    verb->callback([args, &console] { run(*args, console); });
+    verb->callback([args, &console] { console.with_threads([&] { run(*args, console); }); });
 }
 
 } // namespace taihu
