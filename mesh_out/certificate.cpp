@@ -358,4 +358,14 @@ std::vector<std::string> faults(const Certificate& certificate) {
     return out;
 }
 
+void require_certificate(const Certificate& certificate, const std::string& where) {
+    if (certificate.holds())
+        return;
+    std::string what;
+    for (const std::string& fault : faults(certificate))
+        what += (what.empty() ? "" : ", ") + fault;
+    throw Error(Fault::numeric, where + ": the surface did not come out closed (" + what +
+                                    "); use another voxel size");
+}
+
 } // namespace taihu

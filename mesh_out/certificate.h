@@ -56,4 +56,9 @@ Certificate certify(const TriMesh& mesh, const CertifySettings& settings = {});
 /// holds.
 std::vector<std::string> faults(const Certificate& certificate);
 
+/// \throws Error numeric with the faults, unless `certificate` holds. \param where  the file, for
+/// the
+///   message.
+void require_certificate(const Certificate& certificate, const std::string& where);
+
 } // namespace taihu

@@ -47,7 +47,12 @@ public:
           reference_((report_stage(progress, "extract"), extract_uniform(solid, progress))),
           box_(bounds(reference_)) {
         origin_step_m_ = position_grid(box_, max_move_m(bound_m(settings.n_levels - 1))).step_m;
-        position_grid(box_, max_move_m(bound_m(0)), origin_step_m_); // refused now, not at the end
+        const double least_step = std::exp2(std::ceil(std::log2(box_.longest() / 0x1p17)));
+        if (max_move_m(bound_m(0)) < least_step * std::sqrt(3.0) / 2)
+            throw Error(Fault::numeric,
+                        "lod: a largest error of " + shown(bound_m(0)) +
+                            " m is finer than positions of 18 bits; allow at least " +
+                            shown(least_step * std::sqrt(3.0) / 2 / kRoundingShare * 1.001) + " m");
     }
 
     LodChain make();
@@ -195,10 +200,11 @@ std::string format_glb(const LodChain& chain, const GlbSettings& settings) {
     return format_glb(levels, settings);
 }
 
-std::string format_report(const LodChain& chain) {
+std::string format_report(const LodChain& chain, const std::string& file) {
     const std::vector<double> coverages = screen_coverages(chain);
     nlohmann::ordered_json report;
     report["taihu_report"] = kReportVersion;
+    report["file"] = file;
     report["reference"] =
         "uniform surface of the level set; distances by closest point, both ways, "
         "on the decoded meshes";

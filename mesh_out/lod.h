@@ -52,6 +52,6 @@ std::string format_glb(const LodChain& chain, const GlbSettings& settings = {});
 
 /// report.json of the chain (data/schema/report.schema.json): `levels` [{triangles, bytes, error_m,
 /// bound_m, rms_m, genus, holes_closed, screen_coverage, ...}].
-std::string format_report(const LodChain& chain);
+std::string format_report(const LodChain& chain, const std::string& file);
 
 } // namespace taihu

@@ -13,7 +13,7 @@
 namespace taihu {
 
 /// Where the meshes are, and how large: shared by all levels of a sheet.
-struct Placement {
+struct ScenePlacement {
     Vec3 center;
     double scale = 1; ///< 1 / largest extent
     double cos_turn = 1, sin_turn = 0;
@@ -36,7 +36,7 @@ struct Hit {
 /// one, of the smallest face where several are equally near.
 class RayScene {
 public:
-    RayScene(const TriMesh& mesh, const Placement& place) : mesh_(mesh), place_(place) {
+    RayScene(const TriMesh& mesh, const ScenePlacement& place) : mesh_(mesh), place_(place) {
         device_ = rtcNewDevice("verbose=0");
         scene_ = device_ ? rtcNewScene(device_) : nullptr;
         if (!scene_) {
@@ -156,7 +156,7 @@ private:
     }
 
     const TriMesh& mesh_;
-    Placement place_;
+    ScenePlacement place_;
     RTCDevice device_ = nullptr;
     RTCScene scene_ = nullptr;
 };

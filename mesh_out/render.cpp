@@ -99,8 +99,8 @@ Box checked_bounds(std::span<const TriMesh> levels) {
     return box;
 }
 
-Placement placement(const Box& box, double turntable_deg) {
-    Placement out;
+ScenePlacement placement(const Box& box, double turntable_deg) {
+    ScenePlacement out;
     out.center = box.lo * 0.5 + box.hi * 0.5;
     out.scale = 1 / box.longest();
     const double turn = radians(std::remainder(turntable_deg, 360));
@@ -113,7 +113,7 @@ Placement placement(const Box& box, double turntable_deg) {
 /// The window that holds every circle which a vertex runs through on the turntable. Seen from the
 /// eye, the point of such a circle at angle a from the eye's meridian has the depth A - B cos a and
 /// the offsets R sin a and C - E cos a: the extremes of their ratios are known in closed form.
-View framed(std::span<const TriMesh> levels, const Placement& place, const RenderSettings& s) {
+View framed(std::span<const TriMesh> levels, const ScenePlacement& place, const RenderSettings& s) {
     const double elevation = radians(s.elevation_deg);
     const double sine = std::sin(elevation), cosine = std::cos(elevation);
     View view{.eye = Vec3{0, sine, cosine} * kEyeDistance,
@@ -158,7 +158,7 @@ std::array<Vec3, 2> tangents(const Vec3& n) {
 /// Draws one window of one scene.
 class Painter {
 public:
-    Painter(const RayScene& scene, const Placement& place, const View& view,
+    Painter(const RayScene& scene, const ScenePlacement& place, const View& view,
             const RenderSettings& settings, std::uint32_t stream)
         : scene_(scene), view_(view), settings_(settings), rng_{settings.seed, stream},
           ground_(place.ground) {
@@ -377,7 +377,7 @@ void fill(Image& image, int x0, int y0, int x1, int y1, float grey) {
 Image render(const TriMesh& mesh, const RenderSettings& settings, Progress* progress) {
     check(settings);
     const std::span<const TriMesh> levels(&mesh, 1);
-    const Placement place = placement(checked_bounds(levels), settings.turntable_deg);
+    const ScenePlacement place = placement(checked_bounds(levels), settings.turntable_deg);
     const View view = framed(levels, place, settings);
     report_stage(progress, "rendering");
     const RayScene scene(mesh, place);
@@ -393,7 +393,7 @@ Image render_sheet(std::span<const TriMesh> levels, const RenderSettings& settin
             static_cast<double>(levels.size()), "1..64");
     const double n_pixels = static_cast<double>(levels.size()) * settings.width * settings.height;
     require(n_pixels <= 0x1p28, "the number of pixels", n_pixels, "at most 2^28");
-    const Placement place = placement(checked_bounds(levels), settings.turntable_deg);
+    const ScenePlacement place = placement(checked_bounds(levels), settings.turntable_deg);
     const View view = framed(levels, place, settings);
     RenderSettings wired = settings;
     wired.wireframe = true;

@@ -1,5 +1,7 @@
 #include "mesh_out/surface_file.h"
 
+#include <cmath>
+
 #include "mesh_out/extract.h"
 #include "mesh_out/lod.h"
 #include "mesh_out/surface_distance.h"
@@ -8,14 +10,16 @@
 namespace taihu {
 namespace {
 
-// Rounding of positions to the grid of a file, as a share of the voxel: finer than any use of the
-// mesh.
-constexpr double kUniformMove = 1.0 / 64;
+/// Farthest that rounding moves a vertex of the uniform surface: what 18 bits allow, far below a
+/// voxel for all but the largest grids.
+double uniform_move_m(const Box& box) {
+    const double step = std::exp2(std::ceil(std::log2(box.longest() / 0x1p17)));
+    return step * std::sqrt(3.0) / 2 * (1 + 1e-9);
+}
 
 /// The uniform surface on a position grid, so that every format can hold it exactly.
 EncodedLevel uniform_level(const openvdb::FloatGrid& solid, const TriMesh& surface) {
-    const double voxel = solid.voxelSize().x();
-    const PositionGrid grid = position_grid(bounds(surface).dilated(voxel), kUniformMove * voxel);
+    const PositionGrid grid = position_grid(bounds(surface), uniform_move_m(bounds(surface)));
     TriMesh snapped = snap_to_grid(surface, grid).mesh;
     snapped.normals = surface_normals(solid, snapped.positions);
     return encode_draco(snapped, grid);
@@ -31,7 +35,7 @@ SurfaceFile format_surface(const openvdb::FloatGrid& solid, MeshFormat format,
     if (settings.uniform) {
         const TriMesh surface = extract_uniform(solid, progress);
         level = uniform_level(solid, surface);
-        file.bound_m = kUniformMove * solid.voxelSize().x();
+        file.bound_m = 4 * uniform_move_m(bounds(surface)); // a few steps where vertices met
         file.error_m = two_sided_distance(level.decoded, surface, solid.voxelSize().x() / 2).max_m;
     } else {
         LodChain chain =
@@ -48,13 +52,7 @@ SurfaceFile format_surface(const openvdb::FloatGrid& solid, MeshFormat format,
         file.bytes = format_mesh(level.decoded, format, recipe);
     }
     file.certificate = certify(parse_mesh(file.bytes, format, "output").levels.at(0));
-    if (!file.certificate.holds()) {
-        std::string what;
-        for (const std::string& fault : faults(file.certificate))
-            what += (what.empty() ? "" : ", ") + fault;
-        throw Error(Fault::numeric, "mesh: the surface did not come out closed (" + what +
-                                        "); use another voxel size, or --uniform");
-    }
+    require_certificate(file.certificate, "mesh");
     return file;
 }
 

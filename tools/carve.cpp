@@ -1,5 +1,6 @@
 // taihu carve: a base minus holes.
-#include "vdb_ops/carve.h"
+#include <cmath>
+
 #include "stats/core/error.h"
 #include "stats/core/file.h"
 #include "stats/core/sha256.h"
@@ -7,6 +8,7 @@
 #include "stats/io/holes_file.h"
 #include "tools/holes_options.h"
 #include "tools/solid_files.h"
+#include "vdb_ops/carve.h"
 #include "vdb_ops/clean.h"
 #include "vdb_ops/recipe.h"
 
@@ -31,7 +33,7 @@ LawHoles read_or_place(const CarveArgs& args, const Solid& base, const Console& 
     if (args.placement.any())
         throw Error(Fault::bad_argument,
                     args.holes.string() + ": a table says where its holes are; --scale, --count, "
-                                          "--porosity and --density are for a law.json");
+                                          "--porosity, --density and --seed are for a law.json");
     LawHoles holes;
     holes.placed.holes = read_holes(args.holes);
     holes.node = holes_node(base_name(args.holes), sha256_hex(read_file(args.holes)));
@@ -53,21 +55,37 @@ CleanSettings clean_settings(const CarveArgs& args) {
     return settings;
 }
 
+/// Share of the base that is gone in the end: holes and pieces away, bubbles filled again.
+double final_porosity(const CarveResult& carved, const CleanResult& cleaned) {
+    return (carved.removed_m3 + cleaned.removed_m3 - cleaned.filled_m3) / carved.base_m3;
+}
+
 void tell(const CarveArgs& args, const LawHoles& holes, const CarveResult& carved,
-          const CleanResult& cleaned, const Console& console) {
+          const CleanResult& cleaned, std::size_t n_missed, const Console& console) {
     const std::string where = args.out.string();
+    const std::size_t n = holes.placed.holes.size();
     console.say_all(where, holes.comments);
-    console.say("{}: carved {} holes ({} below 1.5 voxels), porosity {:.4f}, removed {:.4g} m^3",
-                where, holes.placed.holes.size(), carved.n_unresolved, carved.porosity(),
-                carved.removed_m3);
-    console.say("{}: {} pieces, {} removed ({:.3g} m^3); {} sealed bubbles, {} filled ({:.3g} m^3)",
-                where, cleaned.n_pieces, cleaned.n_pieces_removed, cleaned.removed_m3,
-                cleaned.n_bubbles, cleaned.n_bubbles_filled, cleaned.filled_m3);
+    console.say("{}: carved {} hole{} ({} below 1.5 voxels), removed {:.4g} m^3", where, n,
+                n == 1 ? "" : "s", carved.n_unresolved, carved.removed_m3);
+    if (n_missed > 0)
+        console.say("{}: {} of {} holes do not touch the base; check their unit and place", where,
+                    n_missed, n);
+    console.say(
+        "{}: voxel pieces: {} found, {} removed ({:.3g} m^3); sealed bubbles: {} found, {} filled "
+        "({:.3g} m^3)",
+        where, cleaned.n_pieces, cleaned.n_pieces_removed, cleaned.removed_m3, cleaned.n_bubbles,
+        cleaned.n_bubbles_filled, cleaned.filled_m3);
+    console.say("{}: porosity {:.4f} as carved, {:.4f} once cleaned", where, carved.porosity(),
+                final_porosity(carved, cleaned));
+    if (args.placement.porosity && std::fabs(carved.porosity() - *args.placement.porosity) > 0.005)
+        console.say("{}: the voxel is too large for these holes to make {:.4g}; use a smaller one",
+                    where, *args.placement.porosity);
 }
 
 void run(const CarveArgs& args, const Console& console) {
     check_solid_path(args.out);
-    console.may_write(args.out);
+    console.may_write(args.out, {args.base.path, args.holes});
+    args.surface.check(args.out);
     const CleanSettings cleaning = clean_settings(args);
     const Solid base = read_solid(args.base, console);
     const LawHoles holes = read_or_place(args, base, console);
@@ -77,14 +95,17 @@ void run(const CarveArgs& args, const Console& console) {
     const CleanResult cleaned = clean(*carved.rock, cleaning, console.progress);
     const std::string recipe = format_recipe(clean_node(difference_node(base.node, holes.node),
                                                         cleaning.n_pieces, cleaning.fill_bubbles),
-                                             base.measure.voxel_m, args.placement.seed);
-    tell(args, holes, carved, cleaned, console);
+                                             base.measure.voxel_m, args.placement.seed.value_or(0));
+    const std::size_t n_missed = count_missing(holes.placed.holes, *base.grid);
+    tell(args, holes, carved, cleaned, n_missed, console);
     auto json = write_solid(args.out, *cleaned.solid, recipe, args.surface, console);
     json["holes"] = holes.placed.holes.size();
     json["unresolved"] = carved.n_unresolved;
     json["base_m3"] = carved.base_m3;
     json["removed_m3"] = carved.removed_m3;
+    json["missed"] = n_missed;
     json["porosity"] = carved.porosity();
+    json["porosity_cleaned"] = final_porosity(carved, cleaned);
     json["pieces"] = cleaned.n_pieces;
     json["pieces_removed"] = cleaned.n_pieces_removed;
     json["pieces_removed_m3"] = cleaned.removed_m3;
@@ -119,7 +140,7 @@ void add_carve(CLI::App& app, Console& console) {
         ->capture_default_str();
     args->base.add_voxel_options(*verb);
     args->surface.add_options(*verb);
-    verb->callback([args, &console] { run(*args, console); });
+    verb->callback([args, &console] { console.with_threads([&] { run(*args, console); }); });
 }
 
 } // namespace taihu

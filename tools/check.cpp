@@ -55,7 +55,7 @@ void add_check(CLI::App& app, Console& console) {
     verb->add_option("file", args->path, "File to check (.vdb .obj .ply .stl .off .glb)")
         ->required();
     args->add_mesh_options(*verb);
-    verb->callback([args, &console] { run(*args, console); });
+    verb->callback([args, &console] { console.with_threads([&] { run(*args, console); }); });
 }
 
 } // namespace taihu

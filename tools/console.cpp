@@ -5,11 +5,13 @@
 #include <unistd.h>
 
 #include "stats/core/error.h"
+#include "stats/core/text.h"
 
 namespace taihu {
 namespace {
 
-volatile std::sig_atomic_t g_signal = 0;
+std::atomic<int> g_signal{0};
+static_assert(std::atomic<int>::is_always_lock_free); // so a handler may write it
 
 void on_signal(int signal) {
     g_signal = signal;
@@ -27,7 +29,9 @@ void catch_stop_signals() {
     action.sa_flags = static_cast<int>(SA_RESETHAND); // a second Ctrl-C kills
     sigaction(SIGINT, &action, nullptr);
     sigaction(SIGTERM, &action, nullptr);
-    std::signal(SIGPIPE, SIG_IGN); // a closed pipe is an error of printf, not a death
+    // A closed pipe and a file size limit are errors of the call that meets them, not deaths.
+    std::signal(SIGPIPE, SIG_IGN);
+    std::signal(SIGXFSZ, SIG_IGN);
 }
 
 TerminalProgress::~TerminalProgress() {
@@ -73,7 +77,8 @@ CLI::App* Console::verb(CLI::App& app, const std::string& name, const std::strin
 
 void Console::say_text(const std::string& line) const {
     if (!quiet)
-        std::fprintf(stderr, "%s%s\n", ::isatty(STDERR_FILENO) ? "\r\033[K" : "", line.c_str());
+        std::fprintf(stderr, "%s%s\n", ::isatty(STDERR_FILENO) ? "\r\033[K" : "",
+                     printable(line, 4096).c_str());
 }
 
 void Console::say_all(const std::string& where, const std::vector<std::string>& lines) const {
@@ -82,11 +87,28 @@ void Console::say_all(const std::string& where, const std::vector<std::string>& 
 }
 
 void Console::result(const nlohmann::ordered_json& object) const {
-    if (json && (std::printf("%s\n", object.dump().c_str()) < 0 || std::fflush(stdout) != 0))
+    const auto replace = nlohmann::ordered_json::error_handler_t::replace; // names may be any bytes
+    if (json && (std::printf("%s\n", object.dump(-1, ' ', false, replace).c_str()) < 0 ||
+                 std::fflush(stdout) != 0))
         throw Error(Fault::io, "stdout: cannot write; check where it goes");
 }
 
-void Console::may_write(const std::filesystem::path& path) const {
+void Console::may_write(const std::filesystem::path& path,
+                        std::initializer_list<std::filesystem::path> others) const {
+    namespace fs = std::filesystem;
+    std::error_code ignored;
+    const fs::path folder = path.has_parent_path() ? path.parent_path() : fs::path(".");
+    if (!fs::is_directory(folder, ignored))
+        throw Error(Fault::io,
+                    path.string() + ": there is no folder " + folder.string() + "; make it first");
+    if (fs::is_directory(path, ignored))
+        throw Error(Fault::io, path.string() + ": is a folder; name a file");
+    for (const fs::path& other : others)
+        if (!other.empty() &&
+            fs::weakly_canonical(other, ignored) == fs::weakly_canonical(path, ignored))
+            throw Error(Fault::bad_argument,
+                        path.string() +
+                            ": is also read or written by this command; choose another name");
     if (no_clobber && std::filesystem::exists(path))
         throw Error(Fault::io,
                     path.string() + ": exists; choose another name, or drop --no-clobber");

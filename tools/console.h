@@ -10,6 +10,8 @@
 #include <CLI/CLI.hpp>
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
+#include <tbb/global_control.h>
+#include <tbb/task_arena.h>
 
 #include "stats/core/progress.h"
 
@@ -43,6 +45,16 @@ struct Console {
     CLI::App* verb(CLI::App& app, const std::string& name, const std::string& does,
                    const std::string& examples);
 
+    /// Runs a verb on as many threads as were asked for, be they more than the machine has.
+    template <class Run>
+    void with_threads(Run&& run) const {
+        if (n_threads == 0)
+            return run();
+        const auto n = static_cast<std::size_t>(n_threads);
+        const tbb::global_control most(tbb::global_control::max_allowed_parallelism, n);
+        tbb::task_arena(n_threads).execute(run);
+    }
+
     /// A line for people, unless -q.
     template <class... Args>
     void say(fmt::format_string<Args...> format, Args&&... args) const {
@@ -53,8 +65,12 @@ struct Console {
     void say_all(const std::string& where, const std::vector<std::string>& lines) const;
     /// The machine's result: with --json one object on stdout.
     void result(const nlohmann::ordered_json& object) const;
-    /// \throws Error io when `path` exists and --no-clobber was given.
-    void may_write(const std::filesystem::path& path) const;
+    /// Asked before any work. \param others  what else the command reads and writes.
+    /// \throws Error io: no such folder, or `path` exists and --no-clobber was given; bad_argument:
+    /// it
+    ///   is one of the others.
+    void may_write(const std::filesystem::path& path,
+                   std::initializer_list<std::filesystem::path> others = {}) const;
 };
 
 /// The signal that asked to stop, or 0.

@@ -119,6 +119,12 @@ PhotoMask parse_mask(const std::string& text) {
 }
 
 void run(FitArgs& args, const Console& console) {
+    if (!args.out.empty()) {
+        if (args.out.extension() != ".json")
+            throw Error(Fault::unsupported, args.out.string() + ": a law is a .json; name one");
+        for (const auto& file : args.files)
+            console.may_write(args.out, {file});
+    }
     if (!args.unit.empty())
         args.settings.unit = unit_from_name(args.unit);
     if (!args.scale_bar.empty())
@@ -134,7 +140,6 @@ void run(FitArgs& args, const Console& console) {
     const std::string law = format_law_file(make_law_file(ranking, measurements));
     tell(ranking, measurements.sample, console);
     if (!args.out.empty()) {
-        console.may_write(args.out);
         write_file(args.out, law);
         console.say("{}: the law", args.out.string());
     }
@@ -179,7 +184,7 @@ void add_fit(CLI::App& app, Console& console) {
     verb->add_option("--level", args->fit.level, "Of the intervals, 0.5..0.9999")
         ->check(CLI::Range(0.5, 0.9999))
         ->capture_default_str();
-    verb->callback([args, &console] { run(*args, console); });
+    verb->callback([args, &console] { console.with_threads([&] { run(*args, console); }); });
 }
 
 } // namespace taihu

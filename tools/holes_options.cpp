@@ -13,7 +13,7 @@ namespace {
 Placement placement_of(const LawFile& law, const PlacementOptions& options, const Measure& measure,
                        const std::string& where, std::vector<std::string>& comments) {
     Placement p;
-    p.seed = options.seed;
+    p.seed = options.seed.value_or(0);
     if (options.scale.empty() && law.unit != LengthUnit::metre)
         throw Error(Fault::bad_argument,
                     where + ": the law's unit is '" + std::string(unit_name(law.unit)) +
@@ -55,8 +55,9 @@ void PlacementOptions::add_options(CLI::App& verb) {
             "Length of one unit of the law: 0.4m, or 25% of the longest axis; needed unless the "
             "law is in metres")
         ->group(group);
-    auto* by_count =
-        verb.add_option("--count", count, "Exactly this many centres inside")->group(group);
+    auto* by_count = verb.add_option("--count", count, "Exactly this many centres inside, 1..1e8")
+                         ->check(CLI::Range(1.0, 1e8))
+                         ->group(group);
     auto* by_porosity = verb.add_option("--porosity", porosity,
                                         "Removed volume / volume, 0..0.95, met within 0.005")
                             ->check(CLI::Range(0.0, 0.95))
@@ -65,7 +66,9 @@ void PlacementOptions::add_options(CLI::App& verb) {
         verb.add_option("--density", density, "Centres per m^3 [the law's own n_v]")->group(group);
     by_count->excludes(by_porosity)->excludes(by_density);
     by_porosity->excludes(by_density);
-    verb.add_option("--seed", seed, "Which of the samples")->group(group)->capture_default_str();
+    verb.add_option("--seed", seed, "Which of the samples [0]")
+        ->check(CLI::Range(0.0, 9.2e18))
+        ->group(group);
 }
 
 LawHoles place_law(const std::filesystem::path& law_path, const PlacementOptions& options,

@@ -16,10 +16,10 @@ struct PlacementOptions {
     std::string scale;
     std::optional<std::uint64_t> count;
     std::optional<double> porosity, density;
-    std::uint64_t seed = 0;
+    std::optional<std::uint64_t> seed; ///< 0 when not given
 
     void add_options(CLI::App& verb);
-    bool any() const { return !scale.empty() || count || porosity || density; }
+    bool any() const { return !scale.empty() || count || porosity || density || seed; }
 };
 
 /// A law placed: the holes, what a recipe says of them, and which figures were chosen.

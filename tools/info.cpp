@@ -1,9 +1,13 @@
 // taihu info: what is in a file, and the recipe that made it.
 #include "stats/core/error.h"
+#include "stats/core/file.h"
+#include "stats/core/text.h"
 #include "stats/io/holes_file.h"
 #include "stats/io/law_file.h"
+#include "stats/io/measurements.h"
 #include "tools/solid_files.h"
 #include "vdb_ops/rasterize.h"
+#include "vdb_ops/recipe.h"
 #include "vdb_ops/vdb_file.h"
 
 namespace taihu {
@@ -46,19 +50,28 @@ Json mesh_info(const SolidOptions& options, const Console& console) {
     return json;
 }
 
-Json law_info(const std::filesystem::path& path) {
-    const LawFile file = read_law_file(path);
-    Json json = {{"kind", "law of hole diameters"},
-                 {"family", family_name(file.law.family())},
-                 {"unit", unit_name(file.unit)},
-                 {"mean_diameter", file.law.mean()},
-                 {"profiles", file.n_profiles}};
-    for (const SourceFile& source : file.source)
-        json["source"].push_back(source.name);
+/// A law or a report, as it stands in its file.
+Json json_info(const std::filesystem::path& path) {
+    const Json text = Json::parse(read_file(path, std::size_t{16} << 20), nullptr, false);
+    if (text.is_object() && text.contains("taihu_report")) {
+        Json json = {{"kind", "report of levels of detail"}};
+        json.update(text);
+        return json;
+    }
+    read_law_file(path); // refuses what is none
+    Json json = {{"kind", "law of hole diameters"}};
+    json.update(text);
     return json;
 }
 
-Json holes_info(const std::filesystem::path& path) {
+Json table_info(const std::filesystem::path& path) {
+    if (read_file(path).find("x_m") == std::string::npos) {
+        const Measurements m = read_measurements(std::span(&path, 1));
+        return {{"kind", "hole diameters measured on pictures"},
+                {"profiles", n_profiles(m.sample)},
+                {"unit", unit_name(m.sample.unit)},
+                {"segments", m.segments.size()}};
+    }
     const std::vector<Sphere> holes = read_holes(path);
     Box box;
     double smallest = holes.empty() ? 0 : 1e300, largest = 0;
@@ -79,9 +92,9 @@ void run(const SolidOptions& options, const Console& console) {
     if (is_vdb(options.path))
         json.update(vdb_info(options.path));
     else if (extension == ".json")
-        json.update(law_info(options.path));
+        json.update(json_info(options.path));
     else if (extension == ".csv")
-        json.update(holes_info(options.path));
+        json.update(table_info(options.path));
     else if (mesh_format(options.path))
         json.update(mesh_info(options, console));
     else
@@ -90,14 +103,22 @@ void run(const SolidOptions& options, const Console& console) {
                         "'; use .vdb, .obj, .ply, .stl, .off, .glb, .json or .csv");
     if (json.contains("recipe")) { // text in the file, an object for people and programs
         const std::string text = json["recipe"].get<std::string>();
-        json["recipe"] = text.empty() ? Json(nullptr) : Json::parse(text, nullptr, false);
-        if (json["recipe"].is_discarded())
-            json["recipe"] = text;
+        json["recipe"] = recipe_solid(text) ? Json::parse(text) : Json(nullptr);
     }
     if (console.json)
         return console.result(json);
-    for (const auto& [key, value] : json.items()) // the answer itself, so on stdout
-        fmt::print("{}: {}\n", key, value.is_string() ? value.get<std::string>() : value.dump());
+    const auto text = [](const Json& value) {
+        return value.is_string() ? printable(value.get<std::string>(), 1000)
+                                 : value.dump(-1, ' ', false, Json::error_handler_t::replace);
+    };
+    for (const auto& [key, value] : json.items()) { // the answer itself, so on stdout
+        if (!value.is_array() || value.empty() || !value[0].is_object()) {
+            fmt::print("{}: {}\n", key, text(value));
+            continue;
+        }
+        for (std::size_t i = 0; i < value.size(); ++i) // a line for each level
+            fmt::print("{} {}: {}\n", key, i, text(value[i]));
+    }
 }
 
 } // namespace
@@ -107,9 +128,13 @@ void add_info(CLI::App& app, Console& console) {
     auto* verb = console.verb(app, "info", "Say what is in a file and which recipe made it",
                               "  taihu info rock.glb\n"
                               "  taihu info rock.vdb --json | jq .recipe");
-    verb->add_option("file", args->path, "Any file that taihu reads or writes")->required();
+    verb->add_option(
+            "file", args->path,
+            "A solid or mesh (.vdb .obj .ply .stl .off .glb), a law or report (.json), or a "
+            "table (.csv)")
+        ->required();
     args->add_mesh_options(*verb);
-    verb->callback([args, &console] { run(*args, console); });
+    verb->callback([args, &console] { console.with_threads([&] { run(*args, console); }); });
 }
 
 } // namespace taihu

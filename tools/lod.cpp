@@ -31,17 +31,17 @@ void tell(const LodChain& chain, const std::string& where, const Console& consol
 void run(LodArgs& args, const Console& console) {
     if (mesh_format(args.out) != MeshFormat::glb)
         throw Error(Fault::unsupported, args.out.string() + ": levels go into a .glb; name one");
-    console.may_write(args.out);
+    console.may_write(args.out, {args.solid.path});
     if (args.report.empty())
         args.report = args.out.parent_path() / "report.json";
-    console.may_write(args.report);
+    console.may_write(args.report, {args.solid.path, args.out});
     const Solid solid = read_solid(args.solid, console);
     args.settings.bound_m = length_m("--max-error", args.max_error, solid.measure);
     const LodChain chain = make_lods(*solid.grid, args.settings, console.progress);
     const RecipeLod lod{args.settings.n_levels, args.settings.bound_m, args.settings.factor};
     const std::string recipe = format_recipe(solid.node, solid.measure.voxel_m, 0, lod);
-    const std::string report = format_report(chain);
-    write_file(args.out, format_glb(chain, {.name = args.out.stem().string(), .recipe = recipe}));
+    const std::string report = format_report(chain, base_name(args.out));
+    write_file(args.out, format_glb(chain, {.recipe = recipe}));
     write_file(args.report, report);
     tell(chain, args.out.string(), console);
     console.say("{}: the figures of each level", args.report.string());
@@ -71,7 +71,7 @@ void add_lod(CLI::App& app, Console& console) {
     verb->add_option("--report", args->report,
                      "Where to write the figures [report.json beside it]");
     args->solid.add_voxel_options(*verb);
-    verb->callback([args, &console] { run(*args, console); });
+    verb->callback([args, &console] { console.with_threads([&] { run(*args, console); }); });
 }
 
 } // namespace taihu

@@ -6,7 +6,6 @@
 #include <unistd.h>
 
 #include <openvdb/openvdb.h>
-#include <tbb/global_control.h>
 
 #include "stats/core/error.h"
 #include "stats/core/text.h"
@@ -18,7 +17,7 @@ namespace {
 enum Exit { kDone = 0, kFailed = 1, kUsage = 2, kBug = 70, kSignalled = 128 };
 
 int fail(int code, const std::string& message) {
-    std::fprintf(stderr, "taihu: %s\n", printable(message, 280).c_str());
+    std::fprintf(stderr, "taihu: %s\n", printable(message, 1000).c_str());
     return code;
 }
 
@@ -72,7 +71,8 @@ int usage_error(const CLI::App& app, int argc, char** argv, const CLI::ParseErro
 
 int run(int argc, char** argv) {
     CLI::App app("Rocks full of holes: measured on photos, carved as sparse volumes, meshed and "
-                 "certified");
+                 "certified",
+                 "taihu");
     app.set_version_flag("--version", "taihu " TAIHU_VERSION);
     app.require_subcommand(1);
     app.get_formatter()->column_width(34);
@@ -95,16 +95,12 @@ int run(int argc, char** argv) {
         return kUsage;
     }
     catch_stop_signals();
-    std::optional<tbb::global_control> threads;
     std::optional<TerminalProgress> progress;
     // Between parsing and the verb's callback, options are known: set up what they ask for.
     for (CLI::App* verb : app.get_subcommands(nullptr))
         verb->parse_complete_callback([&] {
             progress.emplace(!console.quiet && ::isatty(STDERR_FILENO));
             console.progress = &*progress;
-            if (console.n_threads > 0)
-                threads.emplace(tbb::global_control::max_allowed_parallelism,
-                                static_cast<std::size_t>(console.n_threads));
             openvdb::initialize();
         });
     try {

@@ -16,6 +16,8 @@ void run(const MeshArgs& args, const Console& console) {
     if (!mesh_format(args.out))
         throw Error(Fault::unsupported,
                     args.out.string() + ": not a mesh format; use .obj, .ply, .stl, .off or .glb");
+    args.surface.check(args.out);
+    console.may_write(args.out, {args.solid.path});
     const Solid solid = read_solid(args.solid, console);
     const std::string recipe = format_recipe(solid.node, solid.measure.voxel_m, 0);
     console.result(write_solid(args.out, *solid.grid, recipe, args.surface, console));
@@ -36,7 +38,7 @@ void add_mesh(CLI::App& app, Console& console) {
         ->required();
     args->surface.add_options(*verb);
     args->solid.add_voxel_options(*verb);
-    verb->callback([args, &console] { run(*args, console); });
+    verb->callback([args, &console] { console.with_threads([&] { run(*args, console); }); });
 }
 
 } // namespace taihu

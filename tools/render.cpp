@@ -87,9 +87,11 @@ void add_render(CLI::App& app, Console& console) {
     verb->add_flag("--wireframe", s.wireframe, "Show the triangles");
     verb->add_flag("--flat", args->flat, "Shade by faces instead of by normals");
     verb->add_flag("--no-ground", args->no_ground, "Without the plain that takes the shadow");
-    verb->add_option("--seed", s.seed, "Of the sampling")->capture_default_str();
+    verb->add_option("--seed", s.seed, "Of the sampling")
+        ->check(CLI::Range(0.0, 9.2e18))
+        ->capture_default_str();
     args->file.add_mesh_options(*verb);
-    verb->callback([args, &console] { run(*args, console); });
+    verb->callback([args, &console] { console.with_threads([&] { run(*args, console); }); });
 }
 
 } // namespace taihu

@@ -19,8 +19,11 @@ struct SampleArgs {
 LawHoles sample(const SampleArgs& args, const Console& console) {
     if (args.box.empty() == args.solid.path.empty())
         throw Error(Fault::bad_argument,
-                    "sample: say where the holes go: --in SOLID or --box X,Y,Z");
+                    "sample: say where the holes go: one of --in SOLID and --box X,Y,Z");
     if (!args.box.empty()) {
+        if (args.solid.dim || !args.solid.voxel.empty() || args.solid.any_mesh_option())
+            throw Error(Fault::bad_argument,
+                        "sample: --dim, --voxel, --close, --unit and --up are for --in");
         const Box box{{0, 0, 0}, parse_size("--box", args.box)};
         return place_law(args.law, args.placement, {0, box.longest()},
                          [&](const Law& law, const Placement& p) {
@@ -35,7 +38,9 @@ LawHoles sample(const SampleArgs& args, const Console& console) {
 }
 
 void run(const SampleArgs& args, const Console& console) {
-    console.may_write(args.out);
+    if (args.out.extension() != ".csv")
+        throw Error(Fault::unsupported, args.out.string() + ": holes are a table; name a .csv");
+    console.may_write(args.out, {args.law, args.solid.path});
     const LawHoles holes = sample(args, console);
     write_file(args.out, format_holes(holes.placed.holes, holes.comments));
     nlohmann::ordered_json json = {{"file", args.out.string()},
@@ -63,7 +68,7 @@ void add_sample(CLI::App& app, Console& console) {
     verb->add_option("--box", args->box, "or a box from the origin: X,Y,Z");
     args->placement.add_options(*verb);
     args->solid.add_voxel_options(*verb);
-    verb->callback([args, &console] { run(*args, console); });
+    verb->callback([args, &console] { console.with_threads([&] { run(*args, console); }); });
 }
 
 } // namespace taihu

@@ -25,7 +25,7 @@ install_packages() {
   local apt=(apt-get)
   if [ "$(id -u)" != 0 ]; then
     if sudo -n true 2>/dev/null; then
-      apt=(sudo apt-get)
+      apt=(sudo env DEBIAN_FRONTEND=noninteractive apt-get)
     else
       printf 'taihu needs these Debian packages, and installing them needs root:\n  sudo apt-get install %s\nThen run this again.\n' "$*" >&2
       exit 1

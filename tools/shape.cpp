@@ -1,4 +1,5 @@
 // taihu shape: base shapes.
+#include "mesh_out/certificate.h"
 #include "stats/core/error.h"
 #include "stats/core/file.h"
 #include "tools/solid_files.h"
@@ -17,18 +18,37 @@ struct ShapeArgs {
     std::optional<int> dim;
 };
 
+/// Options that the kind does not read are mistakes, not decoration.
+void refuse_unused(ShapeKind kind, const CLI::App& verb) {
+    using enum ShapeKind;
+    const bool round = kind == sphere || kind == ellipsoid || kind == cylinder || kind == torus ||
+                       kind == icosphere || kind == boulder;
+    const std::pair<const char*, bool> uses[] = {{"--tube", kind == torus},
+                                                 {"--relief", kind == boulder},
+                                                 {"--lumps", kind == boulder},
+                                                 {"--seed", kind == boulder},
+                                                 {"--subdivisions", round}};
+    for (const auto& [option, used] : uses)
+        if (!used && verb.get_option(option)->count() > 0)
+            throw Error(Fault::bad_argument, std::string("shape: a ") +
+                                                 std::string(shape_name(kind)) + " has no " +
+                                                 option + "; drop it");
+}
+
 /// The shape as the file says: a mesh as it is, a level set by its exact distances.
-void run(ShapeArgs& args, const Console& console) {
+void run(ShapeArgs& args, const CLI::App& verb, const Console& console) {
     args.settings.kind = shape_kind(args.kind);
+    refuse_unused(args.settings.kind, verb);
     args.settings.size_m = parse_size("--size", args.size);
-    const Box box{args.settings.size_m * -0.5, args.settings.size_m * 0.5};
-    args.settings.tube_m = args.tube.empty() ? 0.25 * args.settings.size_m.x
-                                             : length_m("--tube", args.tube, {0, box.longest()});
+    args.settings.tube_m = args.tube.empty()
+                               ? 0.25 * args.settings.size_m.x
+                               : length_m("--tube", args.tube, {0, args.settings.size_m.x});
+    const TriMesh mesh = shape_mesh(args.settings); // refuses settings out of range
+    const Box box = shape_box(args.settings);
     check_solid_path(args.out);
     console.may_write(args.out);
     const std::string node = shape_node(args.settings);
     nlohmann::ordered_json json = {{"file", args.out.string()}, {"kind", args.kind}};
-    const TriMesh mesh = shape_mesh(args.settings);
     if (is_vdb(args.out)) {
         Lattice lattice;
         lattice.voxel_m = args.voxel.empty() ? voxel_for(box, args.dim.value_or(kDefaultDim))
@@ -45,7 +65,11 @@ void run(ShapeArgs& args, const Console& console) {
                         "shape: --dim and --voxel are for a .vdb; a mesh takes "
                         "--subdivisions");
         const MeshFormat format = *mesh_format(args.out);
-        write_file(args.out, format_mesh(mesh, format, format_recipe(node, 0, args.settings.seed)));
+        const std::string bytes =
+            format_mesh(mesh, format, format_recipe(node, 0, args.settings.seed));
+        require_certificate(certify(parse_mesh(bytes, format, args.out.string()).levels.at(0)),
+                            args.out.string());
+        write_file(args.out, bytes);
         json["triangles"] = mesh.triangles.size();
         json["volume_m3"] = signed_volume_m3(mesh);
         console.say("{}: {}, {} triangles, {:.4g} m^3", args.out.string(), args.kind,
@@ -80,11 +104,14 @@ void add_shape(CLI::App& app, Console& console) {
     verb->add_option("--lumps", s.lumps, "boulder: lumps per radius, 0.1..16")
         ->check(CLI::Range(0.1, 16.0))
         ->capture_default_str();
-    verb->add_option("--seed", s.seed, "boulder: which of them")->capture_default_str();
+    verb->add_option("--seed", s.seed, "boulder: which of them")
+        ->check(CLI::Range(0.0, 9.2e18))
+        ->capture_default_str();
     auto* dim = verb->add_option("--dim", args->dim, "A .vdb: voxels along the longest axis [256]")
                     ->check(CLI::Range(4, 65536));
     verb->add_option("--voxel", args->voxel, "or the size of a voxel, as 5mm")->excludes(dim);
-    verb->callback([args, &console] { run(*args, console); });
+    verb->callback(
+        [args, verb, &console] { console.with_threads([&] { run(*args, *verb, console); }); });
 }
 
 } // namespace taihu

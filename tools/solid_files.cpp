@@ -12,23 +12,33 @@
 namespace taihu {
 namespace {
 
-/// Length of the longest axis of what lies inside.
+/// Length of the longest axis of what lies inside: an inside voxel's own distance leads on to the
+/// surface, so the voxel size does not show.
 double longest_m(const openvdb::FloatGrid& grid) {
-    openvdb::CoordBBox box;
+    const double voxel = grid.voxelSize().x();
+    Box box;
     for (auto leaf = grid.tree().cbeginLeaf(); leaf; ++leaf)
         for (auto v = leaf->cbeginValueOn(); v; ++v)
-            if (*v < 0)
-                box.expand(v.getCoord());
-    if (box.empty())
-        return 0;
-    // A surface passes about half a voxel beyond its outermost inside voxels.
-    return grid.voxelSize().x() * box.dim()[static_cast<int>(box.maxExtent())];
+            if (*v < 0) {
+                const openvdb::Coord c = v.getCoord();
+                const Vec3 p{double(c.x()), double(c.y()), double(c.z())}, d{1, 1, 1};
+                box.include(p + d * (*v / voxel));
+                box.include(p - d * (*v / voxel));
+            }
+    return box.empty() ? 0 : box.longest() * voxel;
+}
+
+std::string lower_extension(const std::filesystem::path& path) {
+    std::string extension = path.extension().string();
+    for (char& c : extension)
+        c = c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c;
+    return extension;
 }
 
 } // namespace
 
 bool is_vdb(const std::filesystem::path& path) {
-    return path.extension() == ".vdb";
+    return lower_extension(path) == ".vdb";
 }
 
 void check_solid_path(const std::filesystem::path& path) {
@@ -39,12 +49,11 @@ void check_solid_path(const std::filesystem::path& path) {
 }
 
 void SolidOptions::add_mesh_options(CLI::App& verb) {
-    verb.add_option("--unit", unit_m, "A mesh file's unit of length [m]: 0.01 for centimetres")
-        ->check(CLI::Range(1e-9, 1e9))
-        ->capture_default_str();
-    verb.add_option("--up", up, "A mesh file's axis that points up")
-        ->check(CLI::IsMember({"y", "z"}))
-        ->capture_default_str();
+    verb.add_option("--unit", unit_m,
+                    "A mesh file's unit of length in metres: 0.01 for centimetres [1]")
+        ->check(CLI::Range(1e-9, 1e9));
+    verb.add_option("--up", up, "A mesh file's axis that points up [y]")
+        ->check(CLI::IsMember({"y", "z"}));
 }
 
 void SolidOptions::add_voxel_options(CLI::App& verb) {
@@ -52,24 +61,24 @@ void SolidOptions::add_voxel_options(CLI::App& verb) {
         verb.add_option("--dim", dim, "A mesh: voxels along its longest axis, 4..65536 [256]")
             ->check(CLI::Range(4, 65536));
     verb.add_option("--voxel", voxel, "or the size of a voxel, as 5mm")->excludes(by_dim);
-    verb.add_option("--close", close, "An open mesh: cap its boundary loops, or refuse it")
-        ->check(CLI::IsMember({"loops", "none"}))
-        ->capture_default_str();
+    verb.add_option("--close", close, "An open mesh: cap its boundary loops, or refuse it [loops]")
+        ->check(CLI::IsMember({"loops", "none"}));
     add_mesh_options(verb);
 }
 
 MeshReadSettings SolidOptions::mesh_settings() const {
-    return {unit_m, up == "z" ? UpAxis::z : UpAxis::y};
+    return {unit_m.value_or(1), z_up() ? UpAxis::z : UpAxis::y};
 }
 
 Solid read_solid(const SolidOptions& options, const Console& console) {
     Solid solid;
     const std::string name = base_name(options.path), where = options.path.string();
     if (is_vdb(options.path)) {
-        if (options.dim || !options.voxel.empty())
+        if (options.dim || !options.voxel.empty() || options.any_mesh_option())
             throw Error(Fault::bad_argument,
-                        where + ": a level set keeps its own voxels; drop --dim and --voxel, or "
-                                "voxelize the mesh again");
+                        where +
+                            ": a level set keeps its own voxels and units; drop --dim, --voxel, "
+                            "--close, --unit and --up, or voxelize the mesh again");
         VdbFile file = read_vdb(options.path);
         solid.grid = file.solid;
         const auto made = recipe_solid(file.recipe);
@@ -78,7 +87,8 @@ Solid read_solid(const SolidOptions& options, const Console& console) {
         const MeshFile file = read_mesh(options.path, options.mesh_settings(), console.progress);
         const TriMesh& mesh = file.levels.front();
         VoxelizeSettings settings;
-        settings.close = options.close == "none" ? CloseRule::none : CloseRule::loops;
+        settings.close =
+            options.close.value_or("loops") == "none" ? CloseRule::none : CloseRule::loops;
         const Box box = bounds(mesh);
         settings.voxel_m = options.voxel.empty()
                                ? voxel_for(box, options.dim.value_or(kDefaultDim))
@@ -96,27 +106,37 @@ Solid read_solid(const SolidOptions& options, const Console& console) {
         if (file.levels.size() > 1)
             solid.found.push_back(fmt::format("the finest of {} levels taken", file.levels.size()));
         console.say_all(where, solid.found);
-        solid.node =
-            mesh_node(name, sha256_hex(read_file(options.path)), options.unit_m, options.up == "z");
+        solid.node = mesh_node(name, sha256_hex(read_file(options.path)),
+                               options.mesh_settings().unit_m, options.z_up());
     }
     solid.measure = {lattice_of(*solid.grid).voxel_m, longest_m(*solid.grid)};
     return solid;
 }
 
 void SurfaceOptions::add_options(CLI::App& verb) {
-    auto* bound = verb.add_option("--max-error", max_error,
-                                  "A mesh: no point farther than this from the uniform surface")
-                      ->capture_default_str();
+    auto* bound =
+        verb.add_option("--max-error", max_error,
+                        "A mesh: no point farther than this from the uniform surface [0.5vox]");
     verb.add_flag("--uniform", uniform, "A mesh: the plain extraction, two triangles a voxel")
         ->excludes(bound);
     verb.add_flag("--no-draco", no_draco, "A GLB: without Draco compression");
+}
+
+void SurfaceOptions::check(const std::filesystem::path& out) const {
+    if (is_vdb(out) && (uniform || no_draco || max_error))
+        throw Error(Fault::bad_argument, out.string() +
+                                             ": a level set has no triangles; drop --max-error, "
+                                             "--uniform and --no-draco");
+    if (no_draco && mesh_format(out) != MeshFormat::glb)
+        throw Error(Fault::bad_argument,
+                    out.string() + ": only a .glb is Draco-compressed; drop --no-draco");
 }
 
 SurfaceSettings SurfaceOptions::settings(const Measure& measure) const {
     SurfaceSettings s;
     s.uniform = uniform;
     s.draco = !no_draco;
-    s.max_error_m = length_m("--max-error", max_error, measure);
+    s.max_error_m = length_m("--max-error", max_error.value_or(kDefaultMaxError), measure);
     return s;
 }
 
@@ -145,11 +165,14 @@ std::string certificate_line(const Certificate& c) {
             line += (line.empty() ? "" : ", ") + fault;
         return line;
     }
-    return fmt::format(
-        "closed 2-manifold, outward: {} triangles, {} piece{}, genus {}, {:.4g} m^3, {} "
-        "self-intersection{}",
-        c.n_triangles, c.n_components, c.n_components == 1 ? "" : "s", c.genus, c.volume_m3,
-        c.n_self_intersections, c.n_self_intersections == 1 ? "" : "s");
+    const auto some = [](std::size_t n, const char* what) {
+        return fmt::format("{} {}{}", n, what, n == 1 ? "" : "s");
+    };
+    return fmt::format("closed 2-manifold, outward: {}, {}{}, genus {}, {:.4g} m^3, {}",
+                       some(c.n_triangles, "triangle"),
+                       some(c.n_components - c.n_cavities, "piece"),
+                       c.n_cavities == 0 ? "" : ", " + some(c.n_cavities, "sealed bubble"), c.genus,
+                       c.volume_m3, some(c.n_self_intersections, "self-intersection"));
 }
 
 nlohmann::ordered_json write_solid(const std::filesystem::path& path,

@@ -18,15 +18,17 @@ namespace taihu {
 /// The options by which a verb takes a solid: a level set, or a mesh that becomes one.
 struct SolidOptions {
     std::filesystem::path path;
-    std::optional<int> dim; ///< voxels along the longest axis
-    std::string voxel;      ///< or their size
-    std::string close = "loops";
-    double unit_m = 1;
-    std::string up = "y";
+    std::optional<int> dim;           ///< voxels along the longest axis
+    std::string voxel;                ///< or their size
+    std::optional<std::string> close; ///< loops, none
+    std::optional<double> unit_m;
+    std::optional<std::string> up; ///< y, z
 
     void add_mesh_options(CLI::App& verb);  ///< --unit, --up
     void add_voxel_options(CLI::App& verb); ///< --dim, --voxel, --close, and the two above
     MeshReadSettings mesh_settings() const;
+    bool z_up() const { return up.value_or("y") == "z"; }
+    bool any_mesh_option() const { return close || unit_m || up; }
 };
 
 struct Solid {
@@ -37,6 +39,7 @@ struct Solid {
 };
 
 inline constexpr int kDefaultDim = 256;
+inline constexpr const char* kDefaultMaxError = "0.5vox";
 
 /// A .vdb as it is, or a mesh voxelized. Findings are said on the console.
 Solid read_solid(const SolidOptions& options, const Console& console);
@@ -44,8 +47,10 @@ Solid read_solid(const SolidOptions& options, const Console& console);
 /// How a surface is written where `-o` names a mesh format.
 struct SurfaceOptions {
     bool uniform = false, no_draco = false;
-    std::string max_error = "0.5vox";
+    std::optional<std::string> max_error;
     void add_options(CLI::App& verb);
+    /// \throws Error bad_argument: an option that has no meaning for this output.
+    void check(const std::filesystem::path& out) const;
     SurfaceSettings settings(const Measure& measure) const;
 };
 

@@ -16,6 +16,7 @@ void run(const VoxelizeArgs& args, const Console& console) {
     if (!is_vdb(args.out))
         throw Error(Fault::bad_argument,
                     args.out.string() + ": voxelize writes a .vdb; use `taihu mesh` for a mesh");
+    console.may_write(args.out, {args.mesh.path});
     const Solid solid = read_solid(args.mesh, console);
     const std::string recipe = format_recipe(solid.node, solid.measure.voxel_m, 0);
     auto json = write_solid(args.out, *solid.grid, recipe, {}, console);
@@ -37,7 +38,7 @@ void add_voxelize(CLI::App& app, Console& console) {
         ->required();
     verb->add_option("-o,--output", args->out, "Where to write the level set (.vdb)")->required();
     args->mesh.add_voxel_options(*verb);
-    verb->callback([args, &console] { run(*args, console); });
+    verb->callback([args, &console] { console.with_threads([&] { run(*args, console); }); });
 }
 
 } // namespace taihu

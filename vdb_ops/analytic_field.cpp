@@ -71,7 +71,8 @@ private:
 AnalyticField::AnalyticField(const Box& box, std::function<double(const Vec3&)> distance)
     : box_(box), distance_(std::move(distance)) {}
 
-std::unique_ptr<LatticeField> AnalyticField::on(const Lattice& lattice) const {
+std::unique_ptr<LatticeField> AnalyticField::on(const Lattice& lattice,
+                                                const openvdb::CoordBBox&) const {
     return std::make_unique<LatticeAnalytic>(box_, distance_, lattice);
 }
 
@@ -96,29 +97,34 @@ double ellipsoid_distance(const Vec3& p, const Vec3& semi_axes) {
     const double shortest = std::min({semi_axes.x, semi_axes.y, semi_axes.z});
     Vec3 a = semi_axes / shortest,
          q{std::fabs(p.x) / shortest, std::fabs(p.y) / shortest, std::fabs(p.z) / shortest};
-    const auto sum = [&](double t) {
-        double s = 0;
+    // With s = t + 1 nothing cancels near the middle plane of the shortest axis, where a = 1.
+    const auto denominator = [&a](int i, double shifted) {
+        return shifted + (a[i] - 1) * (a[i] + 1);
+    };
+    const auto sum = [&](double shifted) {
+        double total = 0;
         for (int i = 0; i < 3; ++i) {
-            const double v = a[i] * q[i] / (t + a[i] * a[i]);
-            s += v * v;
+            const double v = a[i] * q[i] / denominator(i, shifted);
+            total += v * v;
         }
-        return s;
+        return total;
     };
     double level = 0;
     for (int i = 0; i < 3; ++i)
         level += (q[i] / a[i]) * (q[i] / a[i]);
     const double side = level < 1 ? -1 : 1;
-    double lo = -1 + 1e-15, hi = std::max({a.x, a.y, a.z}) * length(q) + 1;
-    // In the plane of the shortest axis' middle the multiplier reaches -1: the nearest point leaves
-    // that plane, and its height there follows from the surface equation.
+    double lo = 1e-300, hi = std::max({a.x, a.y, a.z}) * length(q) + 2;
+    // In that middle plane the multiplier may reach its end: the nearest point leaves the plane,
+    // and its height there follows from the surface equation.
     const bool degenerate = sum(lo) < 1;
-    for (int i = 0; i < 200 && !degenerate; ++i) {
-        const double middle = 0.5 * (lo + hi);
+    for (int i = 0; i < 1100 && !degenerate; ++i) {
+        // By exponents while they differ, then by values.
+        const double middle = hi > 4 * lo ? std::sqrt(lo) * std::sqrt(hi) : 0.5 * (lo + hi);
         if (middle <= lo || middle >= hi)
             break;
         (sum(middle) > 1 ? lo : hi) = middle;
     }
-    const double t = degenerate ? -1 : 0.5 * (lo + hi);
+    const double shifted = degenerate ? 0 : 0.5 * (lo + hi);
     double d2 = 0, on_surface = 0;
     int flat = -1;
     for (int i = 0; i < 3; ++i) {
@@ -126,8 +132,8 @@ double ellipsoid_distance(const Vec3& p, const Vec3& semi_axes) {
             flat = i;
             continue;
         }
-        const double denominator = t + a[i] * a[i];
-        const double y = denominator > 0 ? a[i] * a[i] * q[i] / denominator : 0;
+        const double over = denominator(i, shifted);
+        const double y = over > 0 ? a[i] * a[i] * q[i] / over : 0;
         d2 += (y - q[i]) * (y - q[i]);
         on_surface += (y / a[i]) * (y / a[i]);
     }

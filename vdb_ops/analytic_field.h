@@ -11,7 +11,8 @@ class AnalyticField final : public Field {
 public:
     /// \param box  holds the solid [m]; \param distance  [m], called from several threads.
     AnalyticField(const Box& box, std::function<double(const Vec3&)> distance);
-    std::unique_ptr<LatticeField> on(const Lattice& lattice) const override;
+    std::unique_ptr<LatticeField> on(const Lattice& lattice,
+                                     const openvdb::CoordBBox& region) const override;
 
 private:
     Box box_;

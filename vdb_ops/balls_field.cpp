@@ -17,6 +17,8 @@ using openvdb::CoordBBox;
 constexpr int kBlock = BlockSampler::kBlock;
 constexpr int kLeaf = BlockSampler::kLeaf;
 
+constexpr double kLarge = 2048; // voxels: floats would lose 1e-4 of one
+
 /// A ball in voxel coordinates.
 struct VoxelBall {
     Vec3 center;
@@ -49,6 +51,9 @@ class BallsBlock final : public BlockSampler {
 public:
     BallsBlock(const Coord& block, const std::vector<VoxelBall>& balls, float half_width)
         : block_(block), half_width_(half_width), first_(kLeaves + 1, 0), inside_(kLeaves, 0) {
+        for (const VoxelBall& ball : balls)
+            if (ball.r > kLarge)
+                large_.push_back(ball);
         each_leaf(balls, [&](const VoxelBall&, std::size_t leaf) { ++first_[leaf + 1]; });
         for (std::size_t i = 0; i < kLeaves; ++i)
             first_[i + 1] += first_[i];
@@ -56,6 +61,10 @@ public:
         std::vector<std::uint32_t> next(first_.begin(), first_.end() - 1);
         each_leaf(balls, [&](const VoxelBall& ball, std::size_t leaf) {
             const Coord o = origin(leaf);
+            if (ball.r > kLarge) { // nothing here: values() takes it in double
+                balls_[next[leaf]++] = {0, 0, 0, -1e9f};
+                return;
+            }
             balls_[next[leaf]++] = {static_cast<float>(ball.center.x - o.x()),
                                     static_cast<float>(ball.center.y - o.y()),
                                     static_cast<float>(ball.center.z - o.z()),
@@ -73,6 +82,8 @@ public:
     void values(const Coord& leaf, float* out) override {
         const std::size_t i = index(leaf);
         std::fill(out, out + 512, half_width_);
+        for (const VoxelBall& ball : large_)
+            min_large_ball(ball, leaf, out);
         min_balls(balls_.data() + first_[i], first_[i + 1] - first_[i], half_width_, out);
         for (int k = 0; k < 512; ++k)
             out[k] = std::max(out[k], -half_width_);
@@ -82,6 +93,13 @@ private:
     static constexpr int kAcross = kBlock / kLeaf;
     static constexpr std::size_t kLeaves = std::size_t{kAcross} * kAcross * kAcross;
 
+    static void min_large_ball(const VoxelBall& ball, const Coord& leaf, float* out) {
+        for (int i = 0; i < 512; ++i) {
+            const Vec3 p{leaf.x() + i / 64 - ball.center.x, leaf.y() + i / 8 % 8 - ball.center.y,
+                         leaf.z() + i % 8 - ball.center.z};
+            out[i] = std::min(out[i], static_cast<float>(length(p) - ball.r));
+        }
+    }
     std::size_t index(const Coord& leaf) const {
         return static_cast<std::size_t>(
             ((leaf.x() - block_.x()) / kLeaf * kAcross + (leaf.y() - block_.y()) / kLeaf) *
@@ -125,21 +143,25 @@ private:
     std::vector<std::uint32_t> first_; // balls of leaf i: balls_[first_[i] .. first_[i + 1])
     std::vector<char> inside_;
     std::vector<LeafBall> balls_;
+    std::vector<VoxelBall> large_; // of the whole block
 };
 
 /// All balls on a lattice, listed by block.
 class LatticeBalls final : public LatticeField {
 public:
-    LatticeBalls(const std::vector<Sphere>& balls, const Lattice& lattice)
+    LatticeBalls(const std::vector<Sphere>& balls, const Lattice& lattice, const CoordBBox& region)
         : half_width_(lattice.half_width_vox) {
         balls_.reserve(balls.size());
         Box box;
         for (const Sphere& s : balls) {
-            balls_.push_back(
-                {(s.center - lattice.origin) / lattice.voxel_m, s.radius_m / lattice.voxel_m});
-            const double reach = balls_.back().r + half_width_;
-            box.include(balls_.back().center - Vec3{reach, reach, reach});
-            box.include(balls_.back().center + Vec3{reach, reach, reach});
+            const VoxelBall ball{(s.center - lattice.origin) / lattice.voxel_m,
+                                 s.radius_m / lattice.voxel_m};
+            if (misses(ball, region))
+                continue;
+            balls_.push_back(ball);
+            const double reach = ball.r + half_width_;
+            box.include(ball.center - Vec3{reach, reach, reach});
+            box.include(ball.center + Vec3{reach, reach, reach});
         }
         if (balls_.empty())
             return;
@@ -174,6 +196,13 @@ public:
     }
 
 private:
+    bool misses(const VoxelBall& ball, const CoordBBox& region) const {
+        for (int axis = 0; axis < 3; ++axis) // blocks that touch the region are opened whole
+            if (ball.center[axis] + ball.r + half_width_ < region.min()[axis] - double(kBlock) ||
+                ball.center[axis] - ball.r - half_width_ > region.max()[axis] + double(kBlock))
+                return true;
+        return false;
+    }
     /// The voxel below `p`, kept within +-2^30 (rasterize() refuses what reaches that far).
     static Coord voxel(const Vec3& p, int up) {
         Coord c;
@@ -226,8 +255,9 @@ BallsField::BallsField(std::span<const Sphere> balls) : balls_(balls.begin(), ba
     }
 }
 
-std::unique_ptr<LatticeField> BallsField::on(const Lattice& lattice) const {
-    return std::make_unique<LatticeBalls>(balls_, lattice);
+std::unique_ptr<LatticeField> BallsField::on(const Lattice& lattice,
+                                             const openvdb::CoordBBox& region) const {
+    return std::make_unique<LatticeBalls>(balls_, lattice, region);
 }
 
 } // namespace taihu

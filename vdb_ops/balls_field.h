@@ -14,7 +14,8 @@ public:
     /// \throws Error bad_argument: `holes[i]` with a radius not finite and > 0, or a centre not
     /// finite.
     explicit BallsField(std::span<const Sphere> balls);
-    std::unique_ptr<LatticeField> on(const Lattice& lattice) const override;
+    std::unique_ptr<LatticeField> on(const Lattice& lattice,
+                                     const openvdb::CoordBBox& region) const override;
 
 private:
     std::vector<Sphere> balls_;

@@ -1,5 +1,6 @@
 #include "vdb_ops/carve.h"
 
+#include <cmath>
 #include <memory>
 
 #include "vdb_ops/balls_field.h"
@@ -23,6 +24,8 @@ CarveResult carve(const openvdb::FloatGrid& rock, std::span<const Sphere> holes,
         result.n_unresolved += hole.radius_m < 1.5 * lattice.voxel_m;
     result.base_m3 = volume_m3(rock);
     result.removed_m3 = result.base_m3 - volume_m3(*result.rock);
+    if (std::fabs(result.removed_m3) < 1e-12 * result.base_m3)
+        result.removed_m3 = 0; // the two sums are over other leaves
     return result;
 }
 

@@ -30,12 +30,9 @@ Choice choose(const std::vector<Components::Part>& parts, const CleanSettings& s
     Choice choice;
     choice.flips.assign(parts.size(), 0);
     std::vector<std::size_t> solids;
-    for (std::size_t p = 0; p < parts.size(); ++p) {
+    for (std::size_t p = 0; p < parts.size(); ++p)
         if (parts[p].solid)
             solids.push_back(p);
-        else if (!parts[p].outside)
-            ++choice.counts.n_bubbles;
-    }
     if (solids.empty())
         throw Error(Fault::bad_input,
                     "clean: nothing is left of the solid; use fewer or smaller holes");
@@ -153,10 +150,13 @@ openvdb::FloatGrid::Ptr flip_parts(const openvdb::FloatGrid& grid, const Compone
                                    const std::vector<char>& flips, Progress* progress) {
     const Lattice lattice = lattice_of(grid);
     const auto& old = components.leaves();
+    const std::vector<char> changing = components.blocks_with(flips);
     std::vector<std::unique_ptr<Leaf>> leaves(old.size());
     tbb::parallel_for(std::size_t{0}, old.size(), [&](std::size_t i) {
         check_cancelled(progress);
         leaves[i] = std::make_unique<Leaf>(*old[i]);
+        if (!components.near_any(old[i]->origin(), changing))
+            return;
         const auto accessor = grid.getConstAccessor();
         const Neighbourhood near(accessor, components, flips, old[i]->origin(),
                                  static_cast<int>(std::ceil(lattice.half_width_vox)) + 2);
@@ -196,18 +196,16 @@ CleanResult clean(const openvdb::FloatGrid& solid, const CleanSettings& settings
     }
     const double before = volume_m3(solid), without_pieces = volume_m3(*grid);
     result.removed_m3 = before - without_pieces;
-    if (settings.fill_bubbles) {
-        // After the pieces: a bubble inside a removed piece went with it, one around it is whole
-        // now.
-        const Components components(*grid);
-        std::vector<char> flips(components.parts().size(), 0);
-        for (std::size_t p = 0; p < flips.size(); ++p)
-            if (!components.parts()[p].solid && !components.parts()[p].outside) {
-                flips[p] = 1;
-                ++result.n_bubbles_filled;
-            }
-        if (result.n_bubbles_filled > 0)
-            grid = flip_parts(*grid, components, flips, progress);
+    // After the pieces: a bubble inside a removed piece went with it, one around it is whole now.
+    const Components components(*grid);
+    std::vector<char> flips(components.parts().size(), 0);
+    for (std::size_t p = 0; p < flips.size(); ++p) {
+        flips[p] = !components.parts()[p].solid && !components.parts()[p].outside;
+        result.n_bubbles += flips[p] != 0;
+    }
+    if (settings.fill_bubbles && result.n_bubbles > 0) {
+        result.n_bubbles_filled = result.n_bubbles;
+        grid = flip_parts(*grid, components, flips, progress);
         result.filled_m3 = volume_m3(*grid) - without_pieces;
     }
     result.solid = grid;

@@ -18,14 +18,14 @@ struct CleanResult {
     openvdb::FloatGrid::Ptr solid; ///< a new grid on the same lattice
     std::size_t n_pieces = 0;      ///< found
     std::size_t n_pieces_removed = 0;
-    std::size_t n_bubbles = 0; ///< found
+    std::size_t n_bubbles = 0; ///< found, once the pieces are gone
     std::size_t n_bubbles_filled = 0;
     double removed_m3 = 0; ///< volume of the pieces that went
     double filled_m3 = 0;  ///< volume of the bubbles that were filled
 };
 
 /// Loose fragments away and sealed bubbles shut. Solid and void voxels connect over faces; the
-/// largest piece is the one of most voxels, at ties the first in x, y, z order. Distances near what
+/// largest piece is the one of most voxels, at ties the first in tree order. Distances near what
 /// went are rebuilt from the surface that stays (within 0.2 voxel there, unchanged elsewhere). The
 /// same bits on any number of threads. O(leaves), plus 1 KiB a leaf. \throws Error bad_argument as
 /// lattice_of(); bad_input: nothing solid is there, or the box of the solid

@@ -386,22 +386,41 @@ private:
                 36 * std::numbers::pi * s.volume_m3 * s.volume_m3 <=
                     1e-12 * s.area_m2 * s.area_m2 * s.area_m2)
                 s.role = Shell::Role::sheet;
+        renumber_by_volume();
         std::vector<Index> first_face(out_.shells.size(), kNone);
         for (Index f = static_cast<Index>(faces_.size()); f-- > 0;)
             first_face[out_.shell_of[f]] = f;
-        for (Index i = 0; i < out_.shells.size(); ++i)
-            for (Index j = 0; j < out_.shells.size(); ++j) {
-                Shell& inner = out_.shells[i];
+        // Larger shells come first, so the last one that holds a shell is the innermost.
+        for (Index i = 0; i < out_.shells.size(); ++i) {
+            Shell& inner = out_.shells[i];
+            for (Index j = i; inner.role == Shell::Role::solid && j-- > 0;) {
                 const Shell& outer = out_.shells[j];
-                if (i == j || inner.role != Shell::Role::solid ||
-                    outer.role == Shell::Role::sheet ||
-                    (inner.volume_m3 < 0) == (outer.volume_m3 < 0) ||
-                    std::fabs(inner.volume_m3) >= std::fabs(outer.volume_m3) ||
-                    !outer.box.contains(inner.box.lo) || !outer.box.contains(inner.box.hi))
+                if (outer.role == Shell::Role::sheet || !outer.box.contains(inner.box.lo) ||
+                    !outer.box.contains(inner.box.hi) ||
+                    std::fabs(winding(j, out_.positions[faces_[first_face[i]][0]])) <= 0.5)
                     continue;
-                if (std::fabs(winding(j, out_.positions[faces_[first_face[i]][0]])) > 0.5)
+                const bool turned = (inner.volume_m3 < 0) != (outer.volume_m3 < 0);
+                if (turned && outer.role == Shell::Role::solid)
                     inner.role = Shell::Role::cavity;
+                break;
             }
+        }
+    }
+
+    void renumber_by_volume() {
+        std::vector<Index> order(out_.shells.size()), number(out_.shells.size());
+        std::iota(order.begin(), order.end(), Index{0});
+        std::stable_sort(order.begin(), order.end(), [&](Index a, Index b) {
+            return std::fabs(out_.shells[a].volume_m3) > std::fabs(out_.shells[b].volume_m3);
+        });
+        std::vector<Shell> shells;
+        for (Index n = 0; n < order.size(); ++n) {
+            shells.push_back(out_.shells[order[n]]);
+            number[order[n]] = n;
+        }
+        out_.shells = std::move(shells);
+        for (Index& s : out_.shell_of)
+            s = number[s];
     }
 
     /// Faces sorted by shell, sheets left out; totals of the diagnosis.

@@ -63,7 +63,7 @@ struct ClosedMesh {
     std::vector<Vec3> positions;         ///< [m], welded
     std::vector<Triangle> triangles;     ///< sorted by shell, sheets left out
     std::vector<std::uint32_t> shell_of; ///< one per triangle
-    std::vector<Shell> shells;
+    std::vector<Shell> shells;           ///< from the largest volume to the smallest
     MeshDiagnosis diagnosis;
 };
 

@@ -1,5 +1,6 @@
 #include "vdb_ops/components_detail.h"
 
+#include <algorithm>
 #include <numeric>
 
 #include <tbb/parallel_for.h>
@@ -171,6 +172,36 @@ void Components::collect() {
     for (const std::uint32_t b : block_)
         if (b >= kUniform)
             parts_[part_of_[b - kUniform]].n_voxels += 512;
+}
+
+std::vector<char> Components::blocks_with(const std::vector<char>& marked) const {
+    std::vector<char> blocks(block_.size(), 0);
+    tbb::parallel_for(std::size_t{0}, block_.size(), [&](std::size_t b) {
+        if (block_[b] >= kUniform) {
+            blocks[b] = marked[part_of_[block_[b] - kUniform]];
+            return;
+        }
+        const std::uint32_t leaf = block_[b];
+        for (std::uint32_t l = 0; l < n_labels_[leaf] && !blocks[b]; ++l)
+            blocks[b] = marked[part_of_[first_label_[leaf] + l]];
+    });
+    return blocks;
+}
+
+bool Components::near_any(const Coord& origin, const std::vector<char>& blocks) const {
+    const Coord at((origin.x() >> 3) - lo_.x(), (origin.y() >> 3) - lo_.y(),
+                   (origin.z() >> 3) - lo_.z());
+    for (int x = std::max(0, at.x() - kMargin); x <= std::min(n_.x() - 1, at.x() + kMargin); ++x)
+        for (int y = std::max(0, at.y() - kMargin); y <= std::min(n_.y() - 1, at.y() + kMargin);
+             ++y)
+            for (int z = std::max(0, at.z() - kMargin); z <= std::min(n_.z() - 1, at.z() + kMargin);
+                 ++z)
+                if (blocks[(static_cast<std::size_t>(x) * static_cast<std::size_t>(n_.y()) +
+                            static_cast<std::size_t>(y)) *
+                               static_cast<std::size_t>(n_.z()) +
+                           static_cast<std::size_t>(z)])
+                    return true;
+    return false;
 }
 
 std::uint32_t Components::part(const Coord& voxel) const {

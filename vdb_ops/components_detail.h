@@ -29,6 +29,10 @@ public:
     /// The part of any voxel inside the box of the leaves.
     std::uint32_t part(const openvdb::Coord& voxel) const;
     const std::vector<const Leaf*>& leaves() const { return leaves_; }
+    /// By block of 8^3 voxels: holds a voxel of a part that is marked in `marked`.
+    std::vector<char> blocks_with(const std::vector<char>& marked) const;
+    /// A block within kMargin of the one at `origin` is set in `blocks`.
+    bool near_any(const openvdb::Coord& origin, const std::vector<char>& blocks) const;
 
 private:
     std::size_t block_index(const openvdb::Coord& voxel) const;

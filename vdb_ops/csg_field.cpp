@@ -81,8 +81,11 @@ private:
 DifferenceField::DifferenceField(std::shared_ptr<const Field> a, std::shared_ptr<const Field> b)
     : a_(std::move(a)), b_(std::move(b)) {}
 
-std::unique_ptr<LatticeField> DifferenceField::on(const Lattice& lattice) const {
-    return std::make_unique<LatticeDifference>(a_->on(lattice), b_->on(lattice));
+std::unique_ptr<LatticeField> DifferenceField::on(const Lattice& lattice,
+                                                  const openvdb::CoordBBox& region) const {
+    auto a = a_->on(lattice, region);
+    auto b = b_->on(lattice, a->bounds()); // what lies outside of a takes nothing away
+    return std::make_unique<LatticeDifference>(std::move(a), std::move(b));
 }
 
 } // namespace taihu

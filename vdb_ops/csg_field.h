@@ -9,7 +9,8 @@ namespace taihu {
 class DifferenceField final : public Field {
 public:
     DifferenceField(std::shared_ptr<const Field> a, std::shared_ptr<const Field> b);
-    std::unique_ptr<LatticeField> on(const Lattice& lattice) const override;
+    std::unique_ptr<LatticeField> on(const Lattice& lattice,
+                                     const openvdb::CoordBBox& region) const override;
 
 private:
     std::shared_ptr<const Field> a_, b_;

@@ -47,8 +47,10 @@ public:
 class Field {
 public:
     virtual ~Field() = default;
-    /// Prepare for sampling on `lattice`. The field must outlive what it returns.
-    virtual std::unique_ptr<LatticeField> on(const Lattice& lattice) const = 0;
+    /// Prepare for sampling on `lattice`, in blocks that meet `region` [voxels]. The field must
+    /// outlive what it returns.
+    virtual std::unique_ptr<LatticeField> on(const Lattice& lattice,
+                                             const openvdb::CoordBBox& region) const = 0;
 };
 
 } // namespace taihu

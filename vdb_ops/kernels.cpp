@@ -1,6 +1,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdlib>
+#include <cstring>
 
 #include "vdb_ops/kernels_detail.h"
 
@@ -36,32 +37,52 @@ void min_balls(const LeafBall* balls, std::size_t n, float half_width, float* va
     }
 }
 
+// Eight voxels along z at a time; compilers split them where registers are shorter.
+typedef float V8 __attribute__((vector_size(32)));
+typedef std::int64_t Lanes __attribute__((vector_size(32)));
+
 TAIHU_CLONES
 void min_triangles(const LeafTriangle* all, const std::uint32_t* begin, const std::uint32_t* end,
                    const int* origin, float half_width, const std::int8_t* winding,
                    float* squared) {
+    constexpr V8 kZ = {0, 1, 2, 3, 4, 5, 6, 7}, kZero = {}, kOne = kZero + 1.f;
     for (; begin != end; ++begin) {
         const LeafTriangle& t = all[*begin];
-        // Corner k relative to the leaf, negated: q[k] + voxel is the voxel seen from the corner.
-        float q[3][3], lo[3], hi[3], side0[3], along0[3];
+        // Everything below is relative to the leaf's first voxel. Feet of that voxel on the edges
+        // are found in double, so that floats only hold what is small: no error grows with the
+        // triangle.
+        double q[3][3]; // corner k to the first voxel
+        float lo[3], hi[3], foot[3][3], u_foot[3], u_first[3], side0[3];
+        for (int k = 0; k < 3; ++k)
+            for (int c = 0; c < 3; ++c)
+                q[k][c] = origin[c] - t.corner[k][c];
         for (int c = 0; c < 3; ++c) {
-            q[0][c] = static_cast<float>(origin[c] - t.a[c]);
-            q[1][c] = q[0][c] - t.e[0][c];
-            q[2][c] = q[0][c] + t.e[2][c];
-            lo[c] = -std::max({q[0][c], q[1][c], q[2][c]});
-            hi[c] = -std::min({q[0][c], q[1][c], q[2][c]});
+            lo[c] = static_cast<float>(-std::max({q[0][c], q[1][c], q[2][c]}));
+            hi[c] = static_cast<float>(-std::min({q[0][c], q[1][c], q[2][c]}));
         }
         for (int k = 0; k < 3; ++k) {
-            side0[k] = t.en[k][0] * q[k][0] + t.en[k][1] * q[k][1] + t.en[k][2] * q[k][2];
-            along0[k] = t.e[k][0] * q[k][0] + t.e[k][1] * q[k][1] + t.e[k][2] * q[k][2];
+            double along = 0, side = 0, e2 = 0, e[3];
+            for (int c = 0; c < 3; ++c) {
+                e[c] = q[k][c] - q[(k + 1) % 3][c];
+                e2 += e[c] * e[c];
+                along += e[c] * q[k][c];
+                side += t.en[k][c] * q[k][c];
+            }
+            const double u = e2 > 0 ? along / e2 : 0, clamped = std::clamp(u, 0.0, 1.0);
+            for (int c = 0; c < 3; ++c)
+                foot[k][c] = static_cast<float>(e[c] * clamped - q[k][c]);
+            u_foot[k] = static_cast<float>(clamped);
+            u_first[k] = static_cast<float>(u - clamped);
+            side0[k] = static_cast<float>(side);
         }
-        const float plane0 = t.n[0] * q[0][0] + t.n[1] * q[0][1] + t.n[2] * q[0][2];
-        float box_z2[8];
-        for (int z = 0; z < 8; ++z) {
-            const auto fz = static_cast<float>(z);
-            const float d = std::max({lo[2] - fz, fz - hi[2], 0.f});
-            box_z2[z] = d * d;
-        }
+        const auto plane0 =
+            static_cast<float>(t.n[0] * q[0][0] + t.n[1] * q[0][1] + t.n[2] * q[0][2]);
+        const float n[3] = {static_cast<float>(t.n[0]), static_cast<float>(t.n[1]),
+                            static_cast<float>(t.n[2])};
+        const V8 below = lo[2] - kZ, above = kZ - hi[2];
+        V8 box_z = below > above ? below : above;
+        box_z = box_z > kZero ? box_z : kZero;
+        const V8 box_z2 = box_z * box_z;
         const int x0 = static_cast<int>(std::ceil(std::clamp(lo[0] - half_width, 0.f, 8.f)));
         const int x1 = static_cast<int>(std::floor(std::clamp(hi[0] + half_width, -1.f, 7.f)));
         const int y0 = static_cast<int>(std::ceil(std::clamp(lo[1] - half_width, 0.f, 8.f)));
@@ -72,50 +93,44 @@ void min_triangles(const LeafTriangle* all, const std::uint32_t* begin, const st
             for (int y = y0; y <= y1; ++y) {
                 const auto fy = static_cast<float>(y);
                 const float dy = std::max({lo[1] - fy, fy - hi[1], 0.f});
-                const float box_xy2 = dx * dx + dy * dy;
-                const float plane_xy = plane0 + t.n[0] * fx + t.n[1] * fy;
-                float* __restrict row = squared + x * 64 + y * 8;
-                float plane[8];
+                float* row = squared + x * 64 + y * 8;
+                V8 old;
+                std::memcpy(&old, row, sizeof old);
                 // A row that the box and the plane of the face already rule out costs no more.
-                bool nearer = false;
-                for (int z = 0; z < 8; ++z) {
-                    plane[z] = plane_xy + t.n[2] * static_cast<float>(z);
-                    nearer |= std::max(box_xy2 + box_z2[z], plane[z] * plane[z]) < row[z];
-                }
-                if (!nearer)
+                const V8 plane = (plane0 + n[0] * fx + n[1] * fy) + n[2] * kZ;
+                const V8 plane2 = plane * plane;
+                V8 bound = (dx * dx + dy * dy) + box_z2;
+                bound = bound > plane2 ? bound : plane2;
+                const Lanes nearer = (Lanes)(bound < old);
+                if ((nearer[0] | nearer[1] | nearer[2] | nearer[3]) == 0)
                     continue;
-                float best[8], inside[8];
-                for (int z = 0; z < 8; ++z)
-                    inside[z] = best[z] = 1e30f;
+                V8 best = kZero + 1e30f, inside = best;
                 for (int k = 0; k < 3; ++k) {
-                    const float s = side0[k] + t.en[k][0] * fx + t.en[k][1] * fy;
-                    const float u0 =
-                        (along0[k] + t.e[k][0] * fx + t.e[k][1] * fy) * t.inverse_e2[k];
-                    const float du = t.e[k][2] * t.inverse_e2[k];
-                    const float px = q[k][0] + fx, py = q[k][1] + fy;
-                    for (int z = 0; z < 8; ++z) {
-                        const auto fz = static_cast<float>(z);
-                        float u = u0 + du * fz;
-                        u = u < 0 ? 0 : u;
-                        u = u > 1 ? 1 : u;
-                        const float ex = t.e[k][0] * u - px, ey = t.e[k][1] * u - py,
-                                    ez = t.e[k][2] * u - (q[k][2] + fz);
-                        const float d = ex * ex + ey * ey + ez * ez;
-                        best[z] = d < best[z] ? d : best[z];
-                        const float side = s + t.en[k][2] * fz;
-                        inside[z] = side < inside[z] ? side : inside[z];
-                    }
+                    const V8 side =
+                        (side0[k] + t.en[k][0] * fx + t.en[k][1] * fy) + t.en[k][2] * kZ;
+                    inside = side < inside ? side : inside;
+                    // How far along the edge from the first voxel's foot, in lengths of the edge.
+                    const float ie2 = t.inverse_e2[k];
+                    V8 u = (u_first[k] + (t.e[k][0] * fx + t.e[k][1] * fy) * ie2) +
+                           (t.e[k][2] * ie2) * kZ;
+                    const V8 from = kZero - u_foot[k], to = kOne - u_foot[k];
+                    u = u < from ? from : u;
+                    u = u > to ? to : u;
+                    const V8 ex = t.e[k][0] * u + (foot[k][0] - fx),
+                             ey = t.e[k][1] * u + (foot[k][1] - fy),
+                             ez = t.e[k][2] * u + (foot[k][2] - kZ);
+                    const V8 d = ex * ex + ey * ey + ez * ez;
+                    best = d < best ? d : best;
                 }
-                for (int z = 0; z < 8; ++z)
-                    best[z] = inside[z] > 0 ? plane[z] * plane[z] : best[z];
+                best = inside > kZero ? plane2 : best;
                 if (winding)
                     for (int z = 0; z < 8; ++z) {
                         const int w = winding[x * 64 + y * 8 + z];
                         if ((w > 0 && plane[z] > 0) || (w < 0 && plane[z] < 0) || std::abs(w) > 1)
                             best[z] = 1e30f;
                     }
-                for (int z = 0; z < 8; ++z)
-                    row[z] = best[z] < row[z] ? best[z] : row[z];
+                best = best < old ? best : old;
+                std::memcpy(row, &best, sizeof best);
             }
         }
     }

@@ -21,12 +21,14 @@ struct LeafBall {
 /// values[512] = min(values, distance to the balls' union), for voxels within `half_width` of one.
 void min_balls(const LeafBall* balls, std::size_t n, float half_width, float* values);
 
-/// A triangle in voxel coordinates: corner a (double, so that errors do not grow with position),
-/// edges e[k] from corner k to k+1, unit normal n, in-plane edge normals en, 1 / |e|^2 (0 for no
-/// length).
+/// A triangle in voxel coordinates. Corners and normal are doubles: what a leaf needs of them is
+/// small, but comes out of differences of large numbers.
 struct LeafTriangle {
-    double a[3];
-    float e[3][3], n[3], en[3][3], inverse_e2[3];
+    double corner[3][3];
+    double n[3];         ///< unit normal, or 0 for a needle
+    float e[3][3];       ///< edge k, from corner k to k + 1
+    float en[3][3];      ///< its normal in the plane, inwards
+    float inverse_e2[3]; ///< 1 / |e|^2, 0 for no length
     std::uint32_t shell;
     float lo[3], hi[3]; ///< box grown by the half width
 };

@@ -24,9 +24,12 @@ public:
     }
 
     void values(const Coord& leaf, float* out) override {
-        const float* in = accessor_.probeConstLeaf(leaf)->buffer().data();
-        for (int i = 0; i < 512; ++i)
-            out[i] = std::clamp(in[i] * inverse_voxel_, -half_width_, half_width_);
+        // Inactive voxels lie beyond the band; their values may round to a little less.
+        const auto& in = *accessor_.probeConstLeaf(leaf);
+        for (openvdb::Index i = 0; i < 512; ++i)
+            out[i] = in.isValueOn(i)
+                         ? std::clamp(in.getValue(i) * inverse_voxel_, -half_width_, half_width_)
+                         : std::copysign(half_width_, in.getValue(i));
     }
 
 private:
@@ -59,7 +62,8 @@ LevelSetField::LevelSetField(openvdb::FloatGrid::ConstPtr grid) : grid_(std::mov
     lattice_of(*grid_);
 }
 
-std::unique_ptr<LatticeField> LevelSetField::on(const Lattice& lattice) const {
+std::unique_ptr<LatticeField> LevelSetField::on(const Lattice& lattice,
+                                                const openvdb::CoordBBox&) const {
     const Lattice own = lattice_of(*grid_);
     const double offset = length(own.origin - lattice.origin);
     if (std::fabs(own.voxel_m - lattice.voxel_m) > 1e-9 * own.voxel_m ||

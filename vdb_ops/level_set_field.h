@@ -11,7 +11,8 @@ public:
     /// \throws Error bad_argument as lattice_of().
     explicit LevelSetField(openvdb::FloatGrid::ConstPtr grid);
     /// \throws Error bad_argument: a lattice other than the grid's own.
-    std::unique_ptr<LatticeField> on(const Lattice& lattice) const override;
+    std::unique_ptr<LatticeField> on(const Lattice& lattice,
+                                     const openvdb::CoordBBox& region) const override;
 
 private:
     openvdb::FloatGrid::ConstPtr grid_;

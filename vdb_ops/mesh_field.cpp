@@ -20,6 +20,7 @@ using openvdb::CoordBBox;
 constexpr int kBlock = BlockSampler::kBlock;
 constexpr int kLeaf = BlockSampler::kLeaf;
 constexpr int kAcross = kBlock / kLeaf;
+constexpr float kOnSurface = 1e-5f; // voxels; distances carry errors of about 2e-6
 constexpr std::size_t kLeaves = std::size_t{kAcross} * kAcross * kAcross;
 
 LeafTriangle leaf_triangle(const std::array<Vec3, 3>& p, std::uint32_t shell, float half_width) {
@@ -41,8 +42,9 @@ LeafTriangle leaf_triangle(const std::array<Vec3, 3>& p, std::uint32_t shell, fl
         }
     }
     for (int c = 0; c < 3; ++c) {
-        t.a[c] = p[0][c];
-        t.n[c] = static_cast<float>(n[c]);
+        for (std::size_t k = 0; k < 3; ++k)
+            t.corner[k][c] = p[k][c];
+        t.n[c] = n[c];
         // Rounded away from the face, so that a cell is never missed.
         constexpr float kFar = std::numeric_limits<float>::infinity();
         t.lo[c] = std::nextafter(static_cast<float>(std::min({p[0][c], p[1][c], p[2][c]})), -kFar) -
@@ -69,13 +71,30 @@ void each_cell(const LeafTriangle& t, int size, const Coord& first, const Coord&
     const double reach =
         half * (std::fabs(t.n[0]) + std::fabs(t.n[1]) + std::fabs(t.n[2])) + half_width + 1e-3;
     const auto middle = [&](int c, int i) {
-        return (first[c] + i) * static_cast<double>(size) + half - t.a[c];
+        return (first[c] + i) * static_cast<double>(size) + half - t.corner[0][c];
+    };
+    // Normals of edges are floats: off by 1e-7 of the face's extent.
+    const double extent = std::max({t.hi[0] - t.lo[0], t.hi[1] - t.lo[1], t.hi[2] - t.lo[2]});
+    const double edge_reach = std::sqrt(3.0) * half + half_width + 0.01 + 1e-6 * extent;
+    // Beyond an edge in the plane: long thin faces would fill their box otherwise.
+    const auto beyond_an_edge = [&](double x, double y, double z) {
+        for (std::size_t e = 0; e < 3; ++e) {
+            const Vec3 from{t.corner[e][0] - t.corner[0][0], t.corner[e][1] - t.corner[0][1],
+                            t.corner[e][2] - t.corner[0][2]};
+            const double side =
+                t.en[e][0] * (x - from.x) + t.en[e][1] * (y - from.y) + t.en[e][2] * (z - from.z);
+            const double edge = 1 / std::sqrt(static_cast<double>(t.inverse_e2[e]));
+            if (side < -edge_reach * edge)
+                return true;
+        }
+        return false;
     };
     for (int i = lo[0]; i <= hi[0]; ++i)
         for (int j = lo[1]; j <= hi[1]; ++j)
             for (int k = lo[2]; k <= hi[2]; ++k)
                 if (std::fabs(t.n[0] * middle(0, i) + t.n[1] * middle(1, j) +
-                              t.n[2] * middle(2, k)) <= reach)
+                              t.n[2] * middle(2, k)) <= reach &&
+                    !beyond_an_edge(middle(0, i), middle(1, j), middle(2, k)))
                     fn(i, j, k);
 }
 
@@ -89,15 +108,10 @@ struct LatticeMeshData {
 
     /// Which shells hold a voxel that no face is near.
     bool inside(const Coord& voxel) const {
-        bool in = false;
-        for (std::uint32_t s = 0; s < mesh.shells.size(); ++s) {
-            const Shell::Role role = mesh.shells[s].role;
-            if (role == Shell::Role::sheet || columns->winding(voxel, s) == 0)
-                continue;
-            if (role == Shell::Role::cavity)
-                return false;
-            in = true;
-        }
+        bool in = false; // from the largest shell to the smallest: what is innermost decides
+        for (std::uint32_t s = 0; s < mesh.shells.size(); ++s)
+            if (mesh.shells[s].role != Shell::Role::sheet && columns->winding(voxel, s) != 0)
+                in = mesh.shells[s].role == Shell::Role::solid;
         return in;
     }
 };
@@ -133,9 +147,8 @@ public:
         const std::uint32_t* face = faces_.data() + first_[index(leaf)];
         const std::uint32_t* last = faces_.data() + first_[index(leaf) + 1];
         const float w = data_.half_width;
-        alignas(64) float solid[512], cavity[512], shell[512];
-        std::fill(solid, solid + 512, w);
-        std::fill(cavity, cavity + 512, w);
+        alignas(64) float shell[512];
+        std::fill(out, out + 512, w);
         for (std::uint32_t s = 0; s < data_.mesh.shells.size(); ++s) {
             const Shell::Role role = data_.mesh.shells[s].role;
             if (role == Shell::Role::sheet)
@@ -143,18 +156,20 @@ public:
             const std::uint32_t* end = face; // lists are sorted by face, so by shell
             while (end != last && data_.triangles[*end].shell == s)
                 ++end;
-            float* into = role == Shell::Role::solid ? solid : cavity;
             if (end == face) { // no face near: all on one side
-                if (data_.columns->winding(leaf, s) != 0)
-                    std::fill(into, into + 512, -w);
-                continue;
+                if (data_.columns->winding(leaf, s) == 0)
+                    continue;
+                std::fill(shell, shell + 512, -w);
+            } else {
+                shell_distance(leaf, s, face, end, shell);
+                face = end;
             }
-            shell_distance(leaf, s, face, end, shell);
-            for (int i = 0; i < 512; ++i)
-                into[i] = std::min(into[i], shell[i]);
-            face = end;
+            if (role == Shell::Role::cavity)
+                subtract_values(out, shell, out);
+            else
+                for (int i = 0; i < 512; ++i)
+                    out[i] = std::min(out[i], shell[i]);
         }
-        subtract_values(solid, cavity, out);
     }
 
 private:
@@ -184,8 +199,10 @@ private:
         min_triangles(data_.triangles.data(), face, end, leaf.data(), w,
                       data_.columns->overlaps_itself(shell) ? winding : nullptr, out);
         for (int i = 0; i < 512; ++i) {
+            // Voxels on the surface all take one side, whatever the last bit says: crumbs
+            // otherwise.
             const float d = std::sqrt(out[i]);
-            out[i] = winding[i] != 0 ? -d : d;
+            out[i] = d < kOnSurface ? 0 : winding[i] != 0 ? -d : d;
         }
     }
 
@@ -300,7 +317,8 @@ private:
 
 MeshField::MeshField(ClosedMesh mesh) : mesh_(std::move(mesh)) {}
 
-std::unique_ptr<LatticeField> MeshField::on(const Lattice& lattice) const {
+std::unique_ptr<LatticeField> MeshField::on(const Lattice& lattice,
+                                            const openvdb::CoordBBox&) const {
     return std::make_unique<LatticeMesh>(mesh_, lattice);
 }
 

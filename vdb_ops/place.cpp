@@ -26,7 +26,6 @@ class Region {
 public:
     virtual ~Region() = default;
     virtual Box box() const = 0;
-    virtual double voxel_m() const = 0; ///< of the samples that porosity is counted on
     virtual bool inside(const Vec3& p) const = 0;
     virtual bool meets(const Sphere& ball) const = 0;
 };
@@ -35,7 +34,6 @@ class BoxRegion final : public Region {
 public:
     explicit BoxRegion(const Box& box) : box_(box) {}
     Box box() const override { return box_; }
-    double voxel_m() const override { return box_.longest() / 128; }
     bool inside(const Vec3& p) const override { return box_.contains(p); }
     bool meets(const Sphere& ball) const override {
         return box_distance(ball.center - box_.center(), box_.size() * 0.5) < ball.radius_m;
@@ -56,7 +54,6 @@ public:
         box_.include(world(box.max()));
     }
     Box box() const override { return box_; }
-    double voxel_m() const override { return lattice_.voxel_m; }
     bool inside(const Vec3& p) const override {
         const Vec3 i = (p - lattice_.origin) / lattice_.voxel_m;
         return openvdb::tools::BoxSampler::sample(accessor_, openvdb::Vec3d(i.x, i.y, i.z)) < 0;
@@ -189,7 +186,7 @@ class PorositySamples {
 public:
     explicit PorositySamples(const Region& region) : box_(region.box()) {
         const Vec3 size = box_.size();
-        step_ = std::max(region.voxel_m(), std::cbrt(size.x * size.y * size.z / kMaxSamples));
+        step_ = std::cbrt(size.x * size.y * size.z / kMaxSamples);
         for (int axis = 0; axis < 3; ++axis)
             n_[axis] = static_cast<int>(size[axis] / step_) + 1;
         there_.resize(static_cast<std::size_t>(n_[0]) * static_cast<std::size_t>(n_[1]) *
@@ -320,6 +317,12 @@ PlacedHoles place_holes(const Law& law, const Placement& placement, const Box& b
     if (box.empty() || !(box.volume() > 0) || !is_finite(box.lo) || !is_finite(box.hi))
         throw Error(Fault::bad_argument, "holes: the box has no volume; give three lengths > 0");
     return place(law, placement, BoxRegion(box), progress);
+}
+
+std::size_t count_missing(std::span<const Sphere> holes, const openvdb::FloatGrid& solid) {
+    const SolidRegion region(solid);
+    return static_cast<std::size_t>(std::count_if(
+        holes.begin(), holes.end(), [&](const Sphere& hole) { return !region.meets(hole); }));
 }
 
 } // namespace taihu

@@ -1,6 +1,7 @@
 #pragma once
 #include <cstdint>
 #include <optional>
+#include <span>
 #include <vector>
 
 #include <openvdb/openvdb.h>
@@ -41,5 +42,8 @@ PlacedHoles place_holes(const Law& law, const Placement& placement, const openvd
 /// The same in a box.
 PlacedHoles place_holes(const Law& law, const Placement& placement, const Box& box,
                         Progress* progress = nullptr);
+
+/// How many of `holes` do not touch `solid`.
+std::size_t count_missing(std::span<const Sphere> holes, const openvdb::FloatGrid& solid);
 
 } // namespace taihu

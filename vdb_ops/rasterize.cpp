@@ -9,6 +9,7 @@
 #include <tbb/parallel_for.h>
 
 #include "stats/core/error.h"
+#include "stats/number_detail.h"
 #include "vdb_ops/kernels_detail.h"
 
 namespace taihu {
@@ -18,6 +19,9 @@ using openvdb::Coord;
 using Leaf = openvdb::FloatTree::LeafNodeType;
 constexpr int kBlock = BlockSampler::kBlock;
 constexpr int kLeaf = BlockSampler::kLeaf;
+constexpr float kLeastWidth = 2, kMostWidth = 16; // half bands [voxels]
+constexpr double kLeastVoxel_m = 1.5e-5;          // OpenVDB takes 3e-15 m^3 for no volume
+constexpr double kMostBlocks = 0x1p27;
 
 /// A leaf node from its distances in voxels, or null when none of them lies in the band.
 std::unique_ptr<Leaf> make_leaf(const Coord& origin, const float* values, const Lattice& lattice) {
@@ -37,29 +41,48 @@ std::unique_ptr<Leaf> make_leaf(const Coord& origin, const float* values, const 
     return leaf;
 }
 
-void check_lattice(const Lattice& lattice, const openvdb::CoordBBox& box) {
+void check_lattice(const Lattice& lattice) {
+    const auto refuse = [](const std::string& what) {
+        throw Error(Fault::bad_argument, "rasterize: " + what);
+    };
     if (!(lattice.voxel_m > 0) || !std::isfinite(lattice.voxel_m))
-        throw Error(Fault::bad_argument, "rasterize: voxel_m is " +
-                                             std::to_string(lattice.voxel_m) +
-                                             ", must be finite and > 0; give a voxel size");
-    if (!(lattice.half_width_vox >= 2 && lattice.half_width_vox <= 16))
-        throw Error(Fault::bad_argument, "rasterize: half_width_vox is " +
-                                             std::to_string(lattice.half_width_vox) +
-                                             ", must be 2..16; 3 is usual");
-    for (int axis = 0; axis < 3; ++axis)
+        refuse("voxel_m is " + shortest(lattice.voxel_m) +
+               ", must be finite and > 0; give a voxel size");
+    if (lattice.voxel_m < kLeastVoxel_m)
+        refuse(
+            "a voxel of " + shortest(lattice.voxel_m) +
+            " m is below the 1.5e-5 m that a level set holds; use a larger voxel, or a larger unit "
+            "of length");
+    if (!(lattice.half_width_vox >= kLeastWidth && lattice.half_width_vox <= kMostWidth))
+        refuse("half_width_vox is " + shortest(static_cast<double>(lattice.half_width_vox)) +
+               ", must be 2..16; 3 is usual");
+}
+
+/// How many blocks of 64^3 voxels the box of the solid has.
+std::size_t count_blocks(const openvdb::CoordBBox& box) {
+    double n = 1;
+    for (int axis = 0; axis < 3; ++axis) {
         if (box.min()[axis] < -(1 << 30) || box.max()[axis] > (1 << 30))
             throw Error(
                 Fault::bad_argument,
                 "rasterize: the solid reaches beyond voxel 2^30; use a larger voxel, or move "
                 "the solid nearer to the origin");
+        n *= (box.max()[axis] >> 6) - (box.min()[axis] >> 6) + 1.0;
+    }
+    if (n > kMostBlocks)
+        throw Error(Fault::unsupported,
+                    "rasterize: the box of the solid holds " + shortest(n) +
+                        " blocks of 64^3 voxels, at most 2^27 are handled; use a "
+                        "larger voxel");
+    return static_cast<std::size_t>(n);
 }
 
 } // namespace
 
 openvdb::FloatGrid::Ptr rasterize(const Field& field, const Lattice& lattice, Progress* progress) {
-    const std::unique_ptr<LatticeField> sampled = field.on(lattice);
+    check_lattice(lattice);
+    const std::unique_ptr<LatticeField> sampled = field.on(lattice, openvdb::CoordBBox::inf());
     const openvdb::CoordBBox box = sampled->bounds();
-    check_lattice(lattice, box);
     const auto background = static_cast<float>(lattice.half_width_vox * lattice.voxel_m);
     auto grid = openvdb::FloatGrid::create(background);
     auto transform = openvdb::math::Transform::createLinearTransform(lattice.voxel_m);
@@ -72,8 +95,7 @@ openvdb::FloatGrid::Ptr rasterize(const Field& field, const Lattice& lattice, Pr
     const Coord first(box.min().x() >> 6, box.min().y() >> 6, box.min().z() >> 6);
     const Coord last(box.max().x() >> 6, box.max().y() >> 6, box.max().z() >> 6);
     const Coord n(last.x() - first.x() + 1, last.y() - first.y() + 1, last.z() - first.z() + 1);
-    const auto n_blocks = static_cast<std::size_t>(n.x()) * static_cast<std::size_t>(n.y()) *
-                          static_cast<std::size_t>(n.z());
+    const std::size_t n_blocks = count_blocks(box);
     std::vector<std::vector<std::unique_ptr<Leaf>>> leaves(n_blocks);
     std::atomic<std::size_t> n_done{0};
     tbb::parallel_for(tbb::blocked_range<std::size_t>(0, n_blocks, 1), [&](const auto& range) {
@@ -115,24 +137,26 @@ Lattice lattice_of(const openvdb::FloatGrid& grid) {
     const std::string where = "grid '" + grid.getName() + "'";
     if (grid.getGridClass() != openvdb::GRID_LEVEL_SET)
         throw Error(Fault::bad_argument, where + ": not a level set; convert it first");
-    const openvdb::Vec3d voxel = grid.voxelSize();
-    const bool axis_aligned =
-        grid.transform().isLinear() &&
-        grid.indexToWorld(openvdb::Vec3d(1, 0, 0))
-            .eq(grid.indexToWorld(openvdb::Vec3d(0.0)) + openvdb::Vec3d(voxel.x(), 0, 0),
-                1e-9 * voxel.x());
-    if (!grid.hasUniformVoxels() || !axis_aligned)
+    const openvdb::Vec3d voxel = grid.voxelSize(), zero = grid.indexToWorld(openvdb::Vec3d(0.0));
+    bool upright = grid.transform().isLinear();
+    for (int axis = 0; axis < 3; ++axis) {
+        openvdb::Vec3d one(0.0);
+        one[axis] = 1;
+        openvdb::Vec3d off = grid.indexToWorld(one) - zero;
+        off[axis] -= voxel.x();
+        upright = upright && off.length() <= 1e-6 * voxel.x();
+    }
+    if (!upright)
         throw Error(Fault::bad_argument,
                     where + ": its voxels are not upright cubes; resample it on a uniform grid");
     Lattice lattice;
     lattice.voxel_m = voxel.x();
-    const openvdb::Vec3d origin = grid.indexToWorld(openvdb::Vec3d(0.0));
-    lattice.origin = {origin.x(), origin.y(), origin.z()};
+    lattice.origin = {zero.x(), zero.y(), zero.z()};
     lattice.half_width_vox = static_cast<float>(grid.background() / voxel.x());
-    if (!(lattice.half_width_vox >= 2 && lattice.half_width_vox < 1000))
-        throw Error(Fault::bad_argument,
-                    where + ": its half band is " + std::to_string(lattice.half_width_vox) +
-                        " voxels, at least 2 are needed; rebuild the level set");
+    if (!(lattice.half_width_vox >= kLeastWidth && lattice.half_width_vox <= kMostWidth))
+        throw Error(Fault::bad_argument, where + ": its half band is " +
+                                             std::to_string(lattice.half_width_vox) +
+                                             " voxels, must be 2..16; rebuild the level set");
     return lattice;
 }
 

@@ -10,7 +10,8 @@ namespace taihu {
 /// Leaves that the surface does not come near are never evaluated. The same bits on any number of
 /// threads, and any block computed alone equals the same block of the whole.
 /// Time O(leaves near the surface), memory that of the result.
-/// \throws Error bad_argument: a lattice out of range, or voxel indices beyond 2^30;
+/// \throws Error bad_argument: a lattice out of range (voxels from 1.5e-5 m), or voxel indices
+/// beyond 2^30;
 ///   cancelled: within one block of 64^3 voxels.
 openvdb::FloatGrid::Ptr rasterize(const Field& field, const Lattice& lattice,
                                   Progress* progress = nullptr);
@@ -18,7 +19,7 @@ openvdb::FloatGrid::Ptr rasterize(const Field& field, const Lattice& lattice,
 /// The lattice that `grid` lies on.
 /// \throws Error bad_argument, naming the grid: not a level set, voxels that are not cubes, a
 /// rotated
-///   or sheared transform, or a half width below 2 voxels.
+///   or sheared transform, or a half width outside 2..16 voxels.
 Lattice lattice_of(const openvdb::FloatGrid& grid);
 
 } // namespace taihu

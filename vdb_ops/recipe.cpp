@@ -3,6 +3,7 @@
 #include <nlohmann/json.hpp>
 
 #include "stats/core/error.h"
+#include "stats/io/json_detail.h"
 
 namespace taihu {
 namespace {
@@ -25,9 +26,15 @@ Json lod_json(const RecipeLod& lod) {
     return {{"levels", lod.n_levels}, {"bound_m", lod.bound_m}, {"factor", lod.factor}};
 }
 
-/// A recipe's text as JSON; null when it is not one.
+/// A recipe's text as JSON; null when it is not one. It may come from any file: depth and size are
+/// limited.
 Json recipe_json(const std::string& recipe) {
-    Json json = Json::parse(recipe, nullptr, false);
+    try {
+        parse_json(recipe, "recipe");
+    } catch (const Error&) {
+        return nullptr;
+    }
+    Json json = Json::parse(recipe); // again, because this one keeps the order of keys
     if (!json.is_object() || !json.contains("taihu_recipe") || !json.contains("solid") ||
         !json["solid"].is_object())
         return nullptr;
@@ -110,14 +117,6 @@ std::optional<std::string> recipe_solid(const std::string& recipe) {
     if (json.is_null())
         return std::nullopt;
     return json["solid"].dump();
-}
-
-std::string with_lod(const std::string& recipe, const RecipeLod& lod) {
-    Json json = recipe_json(recipe);
-    if (json.is_null())
-        throw Error(Fault::bad_input, "recipe: not a taihu recipe; make the solid again");
-    json["lod"] = lod_json(lod);
-    return json.dump();
 }
 
 } // namespace taihu

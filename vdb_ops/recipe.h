@@ -1,9 +1,7 @@
 #pragma once
 #include <cstdint>
 #include <optional>
-#include <span>
 #include <string>
-#include <vector>
 
 #include "vdb_ops/place.h"
 #include "vdb_ops/shapes.h"
@@ -41,7 +39,5 @@ std::string format_recipe(const std::string& solid, double voxel_m, std::uint64_
 
 /// The `solid` node of a recipe, to build on; nothing when `recipe` is not one.
 std::optional<std::string> recipe_solid(const std::string& recipe);
-/// `recipe` with its `lod` replaced. \throws Error bad_input when `recipe` is not one.
-std::string with_lod(const std::string& recipe, const RecipeLod& lod);
 
 } // namespace taihu

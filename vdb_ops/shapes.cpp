@@ -187,6 +187,13 @@ std::string_view shape_name(ShapeKind kind) {
     return kNames[static_cast<std::size_t>(kind)];
 }
 
+Box shape_box(const ShapeSettings& s) {
+    Vec3 half = s.size_m * 0.5;
+    if (s.kind == ShapeKind::torus)
+        half.y = s.tube_m / 2;
+    return {-half, half};
+}
+
 TriMesh shape_mesh(const ShapeSettings& s) {
     check_settings(s);
     const Vec3 half = s.size_m * 0.5;
@@ -212,7 +219,7 @@ TriMesh shape_mesh(const ShapeSettings& s) {
 std::unique_ptr<Field> shape_field(const ShapeSettings& s) {
     check_settings(s);
     const Vec3 half = s.size_m * 0.5;
-    const Box box{-half, half};
+    const Box box = shape_box(s);
     switch (s.kind) {
     case ShapeKind::sphere:
         return std::make_unique<BallsField>(std::array<Sphere, 1>{{{{}, half.x}}});

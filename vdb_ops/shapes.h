@@ -14,7 +14,7 @@ enum class ShapeKind { sphere, ellipsoid, box, cylinder, torus, icosphere, bould
 ShapeKind shape_kind(std::string_view name);
 std::string_view shape_name(ShapeKind kind);
 
-/// A base shape, centred on the origin; what a kind does not use is ignored by it and said so.
+/// A base shape, centred on the origin. A kind reads the settings that name it, and size_m.
 struct ShapeSettings {
     ShapeKind kind = ShapeKind::boulder;
     Vec3 size_m{1, 1, 1};   ///< extents along X, Y, Z [m], each > 0
@@ -31,6 +31,9 @@ struct ShapeSettings {
 /// settings give the same bytes on every platform, but for the last bit of cos and sin in cylinder
 /// and torus. \throws Error bad_argument naming the setting and its range.
 TriMesh shape_mesh(const ShapeSettings& settings);
+
+/// The box of the shape; the height of a torus is its tube, whatever size_m.y says.
+Box shape_box(const ShapeSettings& settings);
 
 /// The shape as a field: exact distances for sphere, ellipsoid, box, cylinder and torus, those of
 /// the mesh for icosphere and boulder.

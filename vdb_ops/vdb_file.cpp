@@ -1,9 +1,9 @@
 #include "vdb_ops/vdb_file.h"
 
 #include <cmath>
-#include <cstdlib>
-#include <unistd.h>
+#include <sstream>
 
+#include <openvdb/io/Archive.h>
 #include <openvdb/io/File.h>
 #include <tbb/parallel_for.h>
 
@@ -50,6 +50,21 @@ void replace_id(std::string& bytes, const std::string& where) {
     bytes.replace(kIdAt, kIdSize, id);
 }
 
+/// OpenVDB's writer over memory: its own file stream does not notice a full disk.
+class Archive final : public openvdb::io::Archive {
+public:
+    std::string bytes(const openvdb::FloatGrid::Ptr& grid) {
+        setCompression(openvdb::io::COMPRESS_BLOSC | openvdb::io::COMPRESS_ACTIVE_MASK);
+        std::ostringstream out(std::ios::binary);
+        out.exceptions(std::ios::badbit | std::ios::failbit);
+        write(out, openvdb::GridCPtrVec{grid}, true);
+        return std::move(out).str();
+    }
+
+private:
+    using openvdb::io::Archive::write;
+};
+
 } // namespace
 
 VdbFile read_vdb(const std::filesystem::path& path) {
@@ -92,7 +107,6 @@ VdbFile read_vdb(const std::filesystem::path& path) {
 
 void write_vdb(const std::filesystem::path& path, const openvdb::FloatGrid& solid,
                const std::string& recipe) {
-    const auto folder = path.has_parent_path() ? path.parent_path() : std::filesystem::path(".");
     auto grid = openvdb::FloatGrid::create(std::const_pointer_cast<openvdb::FloatTree>(
         std::static_pointer_cast<const openvdb::FloatTree>(
             solid.constTreePtr()))); // shares the tree
@@ -102,25 +116,13 @@ void write_vdb(const std::filesystem::path& path, const openvdb::FloatGrid& soli
     if (!recipe.empty())
         grid->insertMeta(kRecipeKey, openvdb::StringMetadata(recipe));
     openvdb::initialize();
-    // OpenVDB seeks while it writes, so it needs a file of its own first.
-    std::string temporary = (folder / ".taihu-tmp-XXXXXX").string();
-    const int made = ::mkstemp(temporary.data());
-    if (made < 0)
-        throw Error(Fault::io, path.string() + ": cannot write there; check the folder");
-    ::close(made);
     std::string bytes;
     try {
-        openvdb::io::File file(temporary);
-        file.setCompression(openvdb::io::COMPRESS_BLOSC | openvdb::io::COMPRESS_ACTIVE_MASK);
-        openvdb::GridCPtrVec grids{grid};
-        file.write(grids);
-        file.close();
-        bytes = read_file(temporary);
+        bytes = Archive().bytes(grid);
     } catch (const std::exception& e) {
-        ::unlink(temporary.c_str());
-        throw Error(Fault::io, path.string() + ": cannot write (" + printable(e.what(), 80) + ")");
+        throw Error(Fault::io, path.string() + ": cannot write (" + printable(e.what(), 80) +
+                                   "); check memory and the folder");
     }
-    ::unlink(temporary.c_str());
     replace_id(bytes, path.string());
     write_file(path, bytes);
 }

@@ -13,6 +13,7 @@ namespace {
 
 // A half band of 3 voxels measured 0.033 leaves per voxel^2 of a rough rock; 2.3 KiB a leaf with
 // its tree, twice over for a base beside its result.
+constexpr int kLeastDim = 4, kMostDim = 65536; // voxels along the longest axis
 constexpr double kLeavesPerVoxel2 = 0.035, kBytesPerLeaf = 2 * 2350;
 
 /// Memory that the machine can give now [bytes]; a large number where it does not say.
@@ -47,7 +48,7 @@ bool any_inside(const openvdb::FloatGrid& solid) {
 } // namespace
 
 double voxel_for(const Box& box, int dim) {
-    if (dim < 4 || dim > 65536)
+    if (dim < kLeastDim || dim > kMostDim)
         throw Error(Fault::bad_argument,
                     "dim: " + std::to_string(dim) +
                         " voxels along the longest axis, must be 4..65536; 256 "
@@ -64,8 +65,12 @@ double estimated_bytes(double area_m2, double voxel_m) {
 
 void refuse_if_too_large(double area_m2, const Box& box, double voxel_m) {
     const double limit = 0.7 * available_bytes(), needed = estimated_bytes(area_m2, voxel_m);
-    const double fits = std::max(voxel_m * std::sqrt(needed / limit), box.longest() / 65536);
-    if (needed <= limit && box.longest() / voxel_m <= 65536 * 1.001)
+    if (box.longest() < kLeastDim * voxel_m)
+        throw Error(Fault::bad_argument,
+                    "voxel: the solid is " + std::to_string(box.longest() / voxel_m) +
+                        " voxels long, must be at least 4; use a smaller voxel");
+    const double fits = std::max(voxel_m * std::sqrt(needed / limit), box.longest() / kMostDim);
+    if (needed <= limit && box.longest() / voxel_m <= kMostDim * 1.001)
         return;
     char text[192];
     std::snprintf(
@@ -84,7 +89,8 @@ VoxelizeResult voxelize(const TriMesh& mesh, const std::string& where,
     lattice.voxel_m = settings.voxel_m;
     lattice.half_width_vox = settings.half_width_vox;
     if (settings.voxel_m > 0)
-        refuse_if_too_large(closed.diagnosis.area_m2, bounds(mesh), settings.voxel_m);
+        refuse_if_too_large(closed.diagnosis.area_m2,
+                            bounds({closed.positions, closed.triangles, {}}), settings.voxel_m);
     result.solid = rasterize(MeshField(std::move(closed)), lattice, progress);
     if (!any_inside(*result.solid))
         throw Error(Fault::bad_input, where + ": smaller than a voxel of " +

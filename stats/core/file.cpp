@@ -13,7 +13,8 @@ namespace taihu {
 namespace {
 
 [[noreturn]] void fail(const std::filesystem::path& path, const char* what, int code) {
-    throw Error(Fault::io, path.string() + ": " + what + ": " + std::strerror(code));
+    throw Error(Fault::io, path.string() + ": " + what + ": " + std::strerror(code) +
+                               "; check the path, its rights and the space left");
 }
 
 /// Closes on every way out, so that an error does not leak a descriptor.

@@ -56,12 +56,37 @@ std::string did_you_mean(std::string_view name, std::span<const std::string_view
     return nearest.empty() ? std::string() : "; did you mean '" + std::string(nearest) + "'?";
 }
 
+namespace {
+
+/// Length of the UTF-8 sequence that starts at `at`, or 0 when there is none.
+std::size_t utf8_length(std::string_view text, std::size_t at) {
+    const auto byte = [&](std::size_t i) {
+        return i < text.size() ? static_cast<unsigned char>(text[i]) : 0u;
+    };
+    const unsigned first = byte(at);
+    const std::size_t n = first < 0x80       ? 1
+                          : first >> 5 == 6  ? 2
+                          : first >> 4 == 14 ? 3
+                          : first >> 3 == 30 ? 4
+                                             : 0;
+    for (std::size_t k = 1; k < n; ++k)
+        if (byte(at + k) >> 6 != 2)
+            return 0;
+    return n;
+}
+
+} // namespace
+
 std::string printable(std::string_view text, std::size_t max_length) {
     static constexpr char kHex[] = "0123456789abcdef";
     std::string out;
-    for (const char c : text.substr(0, max_length)) {
+    std::size_t whole = 0; // up to here bytes belong to a good sequence
+    for (std::size_t i = 0; i < std::min(text.size(), max_length); ++i) {
+        const char c = text[i];
         const auto u = static_cast<unsigned char>(c);
-        if (u < 0x20 || u == 0x7f) {
+        if (i >= whole)
+            whole = i + utf8_length(text, i);
+        if (u < 0x20 || u == 0x7f || i >= whole) {
             out += "\\x";
             out += kHex[u >> 4];
             out += kHex[u & 15];

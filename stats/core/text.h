@@ -21,7 +21,8 @@ std::string_view trimmed(std::string_view text);
 /// when none is near.
 std::string did_you_mean(std::string_view name, std::span<const std::string_view> known);
 
-/// `text` fit for one line of a message: control characters escaped, cut at `max_length`.
+/// `text` fit for one line of a message: control characters and bytes that are no UTF-8
+/// escaped, cut at `max_length`.
 std::string printable(std::string_view text, std::size_t max_length = 40);
 
 } // namespace taihu

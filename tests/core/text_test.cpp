@@ -31,6 +31,7 @@ TEST(DidYouMean, NamesTheNearestOrNothing) {
 TEST(Printable, KeepsAMessageOnOneLine) {
     EXPECT_EQ(printable("a\nb\x1b"), "a\\x0ab\\x1b");
     EXPECT_EQ(printable("abcdef", 3), "abc...");
+    EXPECT_EQ(printable("caf\xc3\xa9 \xe9 \xff"), "caf\xc3\xa9 \\xe9 \\xff");
 }
 
 } // namespace

@@ -86,12 +86,13 @@ TEST(Lod, IsByteIdenticalOnOneThreadAndMany) {
     const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, 1);
     const LodChain one = make_lods(*holed_rock(), kSettings);
     EXPECT_EQ(format_glb(one), format_glb(rock_chain()));
-    EXPECT_EQ(format_report(one), format_report(rock_chain()));
+    EXPECT_EQ(format_report(one, "a.glb"), format_report(rock_chain(), "a.glb"));
 }
 
 TEST(Lod, ReportHoldsWhatWasMeasured) {
-    const auto report = nlohmann::json::parse(format_report(rock_chain()));
+    const auto report = nlohmann::json::parse(format_report(rock_chain(), "a.glb"));
     EXPECT_EQ(report.at("n_reference_triangles"), rock_chain().n_reference_triangles);
+    EXPECT_EQ(report.at("file"), "a.glb");
     EXPECT_EQ(report.at("note"), "");
     EXPECT_THAT(report.at("reference").get<std::string>(), HasSubstr("uniform surface"));
     ASSERT_EQ(report.at("levels").size(), 4u);
@@ -119,7 +120,7 @@ TEST(Lod, ScreenCoverageIsWhereTheNextLevelsErrorIsAPixel) {
     chain.levels[0].certificate.box = {{0, 0, 0}, {2, 1, 0.5}};
     chain.levels[1].certificate.box = {{0, 0, 0}, {2, 1, 0.5}};
     chain.levels[1].error_m = 0.01;
-    const auto report = nlohmann::json::parse(format_report(chain));
+    const auto report = nlohmann::json::parse(format_report(chain, "rock.glb"));
     EXPECT_NEAR(report["levels"][0]["screen_coverage"].get<double>(), 200.0 * 100 / (1920.0 * 1080),
                 1e-12); // rounding
 }

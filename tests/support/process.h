@@ -24,7 +24,7 @@ inline Finished run(const std::string& command, const std::filesystem::path& fol
                err = folder / (".err" + std::to_string(n));
     ++n;
     const std::string line = "cd '" + folder.string() +
-                             "' && PATH='" TAIHU_PROGRAM_DIR "':$PATH && " + command + " >'" +
+                             "' && PATH='" TAIHU_PROGRAM_DIR "':$PATH && { " + command + "; } >'" +
                              out.string() + "' 2>'" + err.string() + "' </dev/null";
     const int status = std::system(line.c_str());
     Finished result{WIFEXITED(status) ? WEXITSTATUS(status) : -1, read_file(out), read_file(err)};

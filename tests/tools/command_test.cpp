@@ -97,14 +97,61 @@ TEST(Command, NoClobberKeepsWhatIsThere) {
 TEST(Command, ASignalCancelsAndLeavesNothing) {
     const Scratch scratch;
     for (const auto& [signal, code] : {std::pair("INT", 130), std::pair("TERM", 143)}) {
-        const Finished said =
-            run("timeout -s " + std::string(signal) +
-                    " 0.5 taihu shape boulder --dim 4000 -q -o big.vdb; test $? = 124 || "
-                    "exit 9; timeout --preserve-status -s " +
-                    signal + " 0.5 taihu shape boulder --dim 4000 -q -o big.vdb",
-                scratch.path());
+        // A level set of 1,600 voxels takes seconds, and 0.5 GB.
+        const Finished said = run(std::string("timeout --preserve-status -s ") + signal +
+                                      " 0.4 taihu shape boulder --dim 1600 -o big.vdb",
+                                  scratch.path());
         EXPECT_EQ(said.exit_code, code);
-        EXPECT_FALSE(std::filesystem::exists(scratch / "big.vdb"));
+        EXPECT_THAT(said.err, HasSubstr("stopped; no output was written")); // caught, not killed
+        EXPECT_EQ(std::distance(std::filesystem::directory_iterator(scratch.path()), {}), 0);
+    }
+}
+
+TEST(Command, AFullDiskOrAFileLimitKeepsTheOldFile) {
+    const Scratch scratch;
+    write_file(scratch / "a.vdb", "old");
+    for (const char* name : {"a.vdb", "a.ply"}) { // 100 KiB at most
+        const Finished said =
+            run("ulimit -f 100; taihu shape boulder " +
+                    std::string(std::string(name) == "a.vdb" ? "--dim 128" : "") + " -q -o " + name,
+                scratch.path());
+        EXPECT_EQ(said.exit_code, 1) << name;
+        EXPECT_THAT(said.err, HasSubstr(std::string(name) + ": cannot write: File too large"))
+            << name;
+    }
+    EXPECT_EQ(read_file(scratch / "a.vdb"), "old");
+    EXPECT_EQ(std::distance(std::filesystem::directory_iterator(scratch.path()), {}), 1);
+}
+
+TEST(Command, InputsAndOutputsAreNeverTheSameFile) {
+    const Scratch scratch;
+    ASSERT_EQ(run("taihu shape box --dim 24 -o a.vdb -q", scratch.path()).exit_code, 0);
+    for (const char* command :
+         {"taihu mesh a.vdb -o ./a.vdb", "taihu lod a.vdb -o a.glb --report a.vdb",
+          "taihu lod a.vdb -o a.glb --report a.glb"}) {
+        const Finished said = run(command, scratch.path());
+        EXPECT_NE(said.exit_code, 0) << command;
+        EXPECT_EQ(lines(said.err), 1) << command;
+    }
+    EXPECT_EQ(run("taihu check a.vdb -q", scratch.path()).exit_code, 0);
+    EXPECT_FALSE(std::filesystem::exists(scratch / "a.glb"));
+    const Finished nowhere = run("taihu mesh a.vdb -o none/a.ply", scratch.path());
+    EXPECT_THAT(nowhere.err, HasSubstr("there is no folder none"));
+}
+
+TEST(Command, OptionsThatWouldDoNothingAreRefused) {
+    const Scratch scratch;
+    write_file(scratch / "h.csv", "x_m,y_m,z_m,radius_m\n0,0,0,0.2\n");
+    ASSERT_EQ(run("taihu shape box --dim 24 -o a.vdb -q", scratch.path()).exit_code, 0);
+    for (const char* command :
+         {"taihu shape sphere --relief 0.2 -o b.ply", "taihu shape box --subdivisions 3 -o b.ply",
+          "taihu carve a.vdb --holes h.csv --seed 3 -o b.vdb",
+          "taihu carve a.vdb --holes h.csv --uniform -o b.vdb",
+          "taihu mesh a.vdb --no-draco -o b.ply", "taihu mesh a.vdb --up z -o b.ply",
+          "taihu shape boulder --seed -1 -o b.ply"}) {
+        const Finished said = run(command, scratch.path());
+        EXPECT_EQ(said.exit_code, 2) << command << said.err;
+        EXPECT_EQ(lines(said.err), 1) << command;
     }
 }
 

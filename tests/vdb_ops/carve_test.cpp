@@ -106,6 +106,12 @@ TEST(Carve, HolesFarAwayOrHugeAreHandled) {
     EXPECT_NEAR(half, std::numbers::pi * 3997 / 6000, 1e-3);
 }
 
+TEST(Carve, AHoleAsLargeAsAPlanetCutsFlat) {
+    for (const double r : {1e4, 1e6, 1e8}) // in voxels 20 times that
+        EXPECT_NEAR(carve(*ball_rock(), std::vector<Sphere>{{{0, -r, 0}, r}}).porosity(), 0.5, 1e-3)
+            << r;
+}
+
 TEST(Carve, CountsHolesThatTheVoxelDoesNotResolve) {
     const auto result = carve(*ball_rock(), std::vector<Sphere>{{{0.5, 0, 0}, 0.07}, {{}, 0.08}});
     EXPECT_EQ(result.n_unresolved, 1u); // 1.5 voxels are 0.075 m

@@ -75,8 +75,11 @@ TEST(Kernels, EveryInstructionSetGivesTheSameBits) {
                 t.e[k][c] = float(e[c]), t.en[k][c] = float(en[c]);
             t.inverse_e2[k] = float(1 / length_squared(e));
         }
-        for (int c = 0; c < 3; ++c)
-            t.a[c] = p[0][c], t.n[c] = float(n[c]);
+        for (int c = 0; c < 3; ++c) {
+            for (int k = 0; k < 3; ++k)
+                t.corner[k][c] = p[k][c];
+            t.n[c] = n[c];
+        }
         const std::uint32_t one = 0;
         const int origin[3] = {0, 0, 0};
         std::vector<float> c(512, 9.f), d(512, 9.f);

@@ -84,6 +84,27 @@ TEST(MeshField, CubeWithFacesOnVoxelPlanesHasTheRightSigns) {
     expect_exact(shape_mesh({.kind = ShapeKind::box}), 1.0 / 16, 1);
 }
 
+TEST(MeshField, ACubeOnVoxelPlanesIsOnePieceAtAnySize) {
+    TriMesh cube = shape_mesh({.kind = ShapeKind::box});
+    for (Vec3& p : cube.positions)
+        p += Vec3{0.5, 0.5, 0.5};
+    const MeshField field(close_mesh(cube, "cube"));
+    for (const int dim : {10, 20, 33, 100, 250, 400}) {
+        const auto grid = rasterize(field, {1.0 / dim, {}, 3});
+        const auto accessor = grid->getConstAccessor();
+        for (int i = -1; i <= dim + 1; ++i) // voxels on the surface are outside, all of them
+            for (int j = -1; j <= dim + 1; j += dim / 10)
+                for (const int k : {-1, 0, 1, dim / 2, dim - 1, dim, dim + 1}) {
+                    const auto in = [dim](int a) { return a > 0 && a < dim; };
+                    ASSERT_EQ(accessor.getValue(openvdb::Coord(i, j, k)) < 0,
+                              in(i) && in(j) && in(k))
+                        << dim << ": " << i << ' ' << j << ' ' << k;
+                    ASSERT_EQ(accessor.getValue(openvdb::Coord(k, i, j)) < 0,
+                              in(i) && in(j) && in(k));
+                }
+    }
+}
+
 TEST(MeshField, AMeshFarFromTheOriginLosesNothing) {
     TriMesh far = shape_mesh({.kind = ShapeKind::icosphere, .subdivisions = 2});
     for (Vec3& p : far.positions)
@@ -130,6 +151,27 @@ TEST(MeshField, ACavityIsRemoved) {
     const auto grid = rasterize(MeshField(close_mesh(mesh, "hollow")), {1.0 / 32, {}, 3});
     EXPECT_GT(grid->tree().getValue(openvdb::Coord(0)), 0);
     EXPECT_NEAR(volume_m3(*grid), outer_m3 - inner_m3, 1e-3);
+}
+
+TEST(MeshField, ASolidInsideACavityIsThere) {
+    TriMesh mesh;
+    double expected = 0;
+    for (const auto& [size, sign] : {std::pair(2.0, 1), std::pair(1.6, -1), std::pair(0.8, 1)}) {
+        const TriMesh ball = shape_mesh(
+            {.kind = ShapeKind::icosphere, .size_m = {size, size, size}, .subdivisions = 3});
+        const auto base = static_cast<std::uint32_t>(mesh.positions.size());
+        mesh.positions.insert(mesh.positions.end(), ball.positions.begin(), ball.positions.end());
+        for (Triangle t : ball.triangles) {
+            if (sign < 0)
+                std::swap(t[0], t[1]);
+            mesh.triangles.push_back({t[0] + base, t[1] + base, t[2] + base});
+        }
+        expected += sign * signed_volume_m3(ball);
+    }
+    const auto grid = rasterize(MeshField(close_mesh(mesh, "nested")), {1.0 / 32, {}, 3});
+    EXPECT_LT(grid->tree().getValue(openvdb::Coord(0)), 0);
+    EXPECT_GT(grid->tree().getValue(openvdb::Coord(0, 0, 19)), 0);
+    EXPECT_NEAR(volume_m3(*grid), expected, 2e-3);
 }
 
 TEST(MeshField, IsBitIdenticalOnOneThreadAndMany) {

@@ -55,12 +55,35 @@ TEST(Rasterize, RefusesLatticesOutOfRange) {
     const BallsField field(std::array<Sphere, 1>{{{{}, 1}}});
     expect_error(Fault::bad_argument, "voxel_m is 0", [&] { rasterize(field, {0, {}, 3}); });
     expect_error(Fault::bad_argument, "half_width_vox", [&] { rasterize(field, {0.1, {}, 1}); });
-    expect_error(Fault::bad_argument, "2^30", [&] { rasterize(field, {1e-10, {}, 3}); });
+    expect_error(Fault::bad_argument, "1.5e-5 m", [&] { rasterize(field, {1e-10, {}, 3}); });
 }
 
 TEST(LevelSetField, GivesItsOwnGridBack) {
     const auto grid = ball_rock();
     EXPECT_EQ(grid_hash(*rasterize(LevelSetField(grid), lattice_of(*grid))), grid_hash(*grid));
+}
+
+TEST(LevelSetField, BandsStayBandsAtAnyVoxelSize) {
+    for (const double voxel : {0.037, 0.041, 0.053, 1.1 / 160}) {
+        const auto grid = ball_rock(1, voxel);
+        const auto again = rasterize(LevelSetField(grid), lattice_of(*grid));
+        EXPECT_EQ(again->activeVoxelCount(), grid->activeVoxelCount()) << voxel;
+        for (auto it = grid->cbeginValueOn(); it; ++it) // to voxels and back: the last bit of a float
+            ASSERT_NEAR(again->tree().getValue(it.getCoord()), *it, 1e-6 * voxel);
+    }
+}
+
+TEST(LatticeOf, RefusesTurnedMirroredAndUnevenVoxels) {
+    for (const openvdb::Vec3d& scale :
+         {openvdb::Vec3d(1e-4, 1e-4, 1.004e-4), openvdb::Vec3d(1e-4, -1e-4, 1e-4)}) {
+        const auto grid = ball_rock();
+        grid->setTransform(openvdb::math::Transform::Ptr(new openvdb::math::Transform(
+            openvdb::math::MapBase::Ptr(new openvdb::math::ScaleMap(scale)))));
+        expect_error(Fault::bad_argument, "not upright cubes", [&] { lattice_of(*grid); });
+    }
+    const auto turned = ball_rock();
+    turned->transform().preRotate(0.3, openvdb::math::X_AXIS);
+    expect_error(Fault::bad_argument, "not upright cubes", [&] { lattice_of(*turned); });
 }
 
 TEST(LevelSetField, RefusesAnotherLattice) {

@@ -24,15 +24,16 @@ TEST(Recipe, ASolidCanBeBuiltOn) {
     const std::string ball = shape_node({.kind = ShapeKind::sphere});
     const std::string recipe = format_recipe(ball, 0.01, 0);
     EXPECT_EQ(recipe_solid(recipe), ball);
-    EXPECT_EQ(recipe_solid(with_lod(recipe, {4, 0.005, 2})), ball);
-    EXPECT_THAT(with_lod(recipe, {4, 0.005, 2}),
-                testing::HasSubstr(R"("lod":{"levels":4,"bound_m":0.005,"factor":2.0})"));
+    const std::string chain = format_recipe(ball, 0.01, 0, RecipeLod{4, 0.005, 2});
+    EXPECT_EQ(recipe_solid(chain), ball);
+    EXPECT_THAT(chain, testing::HasSubstr(R"("lod":{"levels":4,"bound_m":0.005,"factor":2.0})"));
 }
 
 TEST(Recipe, WhatIsNoneIsSaid) {
     EXPECT_EQ(recipe_solid("{}"), std::nullopt);
     EXPECT_EQ(recipe_solid("not json"), std::nullopt);
-    expect_error(Fault::bad_input, "not a taihu recipe", [] { with_lod("[]", {}); });
+    EXPECT_EQ(recipe_solid(std::string(200000, '[')), std::nullopt);
+    EXPECT_EQ(recipe_solid("{\"taihu_recipe\": 1, \"solid\": \"\xff\"}"), std::nullopt);
 }
 
 } // namespace

@@ -56,6 +56,13 @@ TEST(Shapes, FieldsHaveTheirAnalyticVolumes) {
     }
 }
 
+TEST(Shapes, ATorusIsAsHighAsItsTube) {
+    const ShapeSettings ring{.kind = ShapeKind::torus, .size_m = {1, 0.02, 1}, .tube_m = 0.3};
+    EXPECT_NEAR(shape_box(ring).size().y, 0.3, 1e-12);
+    const double exact = 2 * kPi * kPi * 0.35 * 0.15 * 0.15;
+    EXPECT_NEAR(volume_m3(*rasterize(*shape_field(ring), {1.0 / 64, {}, 3})), exact, 2e-3 * exact);
+}
+
 TEST(Shapes, BoulderFillsItsSizeAndFollowsItsSeed) {
     ShapeSettings s{.size_m = {1, 2, 0.5}, .subdivisions = 3, .seed = 7};
     const TriMesh a = shape_mesh(s);

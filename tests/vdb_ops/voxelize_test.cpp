@@ -28,12 +28,18 @@ TEST(Voxelize, RefusesWhatCannotFitBeforeItStarts) {
                  [&] { voxelize(mesh, "boulder", {.voxel_m = 1e-6}); });
 }
 
-TEST(Voxelize, RefusesAMeshWithoutAnInsideVoxel) {
-    TriMesh grain = shape_mesh({.size_m = {1e-3, 1e-3, 1e-3}, .subdivisions = 1});
-    for (Vec3& p : grain.positions)
-        p += Vec3{0.5, 0.5, 0.5}; // between the voxels
-    expect_error(Fault::bad_input, "grain: smaller than a voxel",
-                 [&] { voxelize(grain, "grain", {.voxel_m = 1}); });
+TEST(Voxelize, RefusesFewerThanFourVoxels) {
+    const TriMesh grain = shape_mesh({.size_m = {1e-3, 1e-3, 1e-3}, .subdivisions = 1});
+    expect_error(Fault::bad_argument, "must be at least 4",
+                 [&] { voxelize(grain, "grain", {.voxel_m = 0.5e-3}); });
+}
+
+TEST(Voxelize, BadCornersAreCountedAndHarmNothing) {
+    TriMesh mesh = shape_mesh({.subdivisions = 2});
+    mesh.triangles.push_back({0, 1, 9999});
+    mesh.positions.push_back({INFINITY, 0, 0});
+    mesh.triangles.push_back({0, 1, static_cast<std::uint32_t>(mesh.positions.size() - 1)});
+    EXPECT_EQ(voxelize(mesh, "boulder", {.voxel_m = 0.05}).diagnosis.n_bad, 2u);
 }
 
 } // namespace
