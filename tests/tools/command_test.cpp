@@ -97,9 +97,9 @@ TEST(Command, NoClobberKeepsWhatIsThere) {
 TEST(Command, ASignalCancelsAndLeavesNothing) {
     const Scratch scratch;
     for (const auto& [signal, code] : {std::pair("INT", 130), std::pair("TERM", 143)}) {
-        // A level set of 1,600 voxels takes seconds, and 0.5 GB.
+        // Long enough to have started, on a job that takes many seconds (and 2 GB).
         const Finished said = run(std::string("timeout --preserve-status -s ") + signal +
-                                      " 0.4 taihu shape boulder --dim 1600 -o big.vdb",
+                                      " 1 taihu shape boulder --dim 3000 -o big.vdb",
                                   scratch.path());
         EXPECT_EQ(said.exit_code, code);
         EXPECT_THAT(said.err, HasSubstr("stopped; no output was written")); // caught, not killed
