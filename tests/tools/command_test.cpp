@@ -97,9 +97,10 @@ TEST(Command, NoClobberKeepsWhatIsThere) {
 TEST(Command, ASignalCancelsAndLeavesNothing) {
     const Scratch scratch;
     for (const auto& [signal, code] : {std::pair("INT", 130), std::pair("TERM", 143)}) {
-        // Long enough to have started, on a job that takes many seconds (and 2 GB).
-        const Finished said = run(std::string("timeout --preserve-status -s ") + signal +
-                                      " 1 taihu shape boulder --dim 3000 -o big.vdb",
+        // In the foreground, or the whole group gets a second signal. Long enough to have started,
+        // on a job that takes many seconds (and 2 GB).
+        const Finished said = run(std::string("timeout --foreground --preserve-status -s ") +
+                                      signal + " 1 taihu shape boulder --dim 3000 -o big.vdb",
                                   scratch.path());
         EXPECT_EQ(said.exit_code, code);
         EXPECT_THAT(said.err, HasSubstr("stopped; no output was written")); // caught, not killed
