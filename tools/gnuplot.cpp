@@ -2,6 +2,7 @@
 
 #include <array>
 #include <cerrno>
+#include <cstdlib>
 #include <cstring>
 #include <spawn.h>
 #include <sys/mman.h>
@@ -84,7 +85,12 @@ std::string gnuplot_svg(const std::string& name, const std::string& script) {
     if (status != 0 || start == std::string::npos || svg.find("</svg>") == std::string::npos)
         throw Error(Fault::unsupported, "report: gnuplot says '" + printable(err.content(), 200) +
                                             "'; is it version 5.4 or later");
-    return svg.substr(start);
+    svg.erase(0, start);
+    // Shapes of points, which no plot of ours has: their ids are the same in every picture.
+    const std::size_t defs = svg.find("<defs>"), end = svg.find("</defs>");
+    if (defs < end && end != std::string::npos)
+        svg.erase(defs, end + std::string("</defs>").size() - defs);
+    return svg;
 }
 
 } // namespace taihu
