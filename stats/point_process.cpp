@@ -178,7 +178,8 @@ ClusterCenters::ClusterCenters(const Box& box, const ClusterSettings& settings, 
     parents_box_ = box.dilated((thomas ? kNormalReach : 1) * settings.spread_m);
     const double mean = settings.parents_m3 * parents_box_.volume();
     if (!(mean <= kMost))
-        refuse(shortest(mean) + " clusters; at most 1e8 are drawn, use a smaller parents_m3");
+        refuse(shortest(mean) +
+               " clusters; at most 1e8 are drawn, use fewer per m^3 or a smaller spread");
     n_parents_ = poisson_count(mean, {seed, kParentCountStream});
 }
 
@@ -188,8 +189,8 @@ double ClusterCenters::mean_count(double density_m3) const {
 
 Vec3 ClusterCenters::center(std::uint64_t i) const {
     if (n_parents_ == 0)
-        throw Error(Fault::numeric, "centres: no cluster fell into the box; use a larger "
-                                    "parents_m3, or another seed");
+        throw Error(Fault::numeric, "centres: no cluster fell into the box; use more per "
+                                    "m^3, or another seed");
     const Rng rng{seed(), kCenterStream}, parents{seed(), kParentStream};
     Draws draws{rng, i};
     const auto pick = static_cast<std::uint64_t>(draws.next() * static_cast<double>(n_parents_));
@@ -270,7 +271,8 @@ std::vector<Vec3> lattice_centers(const Box& box, double spacing_m) {
     double n[3], all = 1;
     Vec3 first;
     for (int axis = 0; axis < 3; ++axis) {
-        n[axis] = std::max(1.0, std::floor(size[axis] / spacing_m));
+        // 0.3 m hold three steps of 0.1 m, whatever the last bit says.
+        n[axis] = std::max(1.0, std::floor(size[axis] / spacing_m * (1 + 1e-12)));
         all *= n[axis];
         first[axis] = box.center()[axis] - 0.5 * spacing_m * (n[axis] - 1);
     }
@@ -325,7 +327,7 @@ std::vector<double> hole_radii(const Law& law, double scale_m, std::uint64_t see
     const HoleStream stream(law, Box{{0, 0, 0}, {1, 1, 1}}, scale_m, seed);
     std::vector<double> radii(n);
     for (std::size_t i = 0; i < n; ++i)
-        radii[i] = stream.hole(i).radius_m;
+        radii[i] = stream.radius_m(i);
     return radii;
 }
 

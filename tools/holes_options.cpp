@@ -230,7 +230,8 @@ void choose_shares(Choice& c) {
 }
 
 void add_pattern_options(PlacementOptions& o, CLI::App& verb) {
-    const std::string group = "Where the holes of a law lie";
+    const std::string group =
+        "Where the holes of a law lie (lengths: 5cm, or 7% of the longest axis)";
     verb.add_option(
             "--pattern", o.pattern,
             "uniform; thomas or matern: in clusters, fading or round; joints: along planes; "

@@ -55,7 +55,7 @@ std::uint64_t HoleSource::size() const {
 
 Sphere HoleSource::hole(std::uint64_t i) const {
     return gap_m_ ? laid_out_[static_cast<std::size_t>(i)]
-                  : Sphere{centers_->center(i), diameters_.hole(i).radius_m};
+                  : Sphere{centers_->center(i), diameters_.radius_m(i)};
 }
 
 void HoleSource::lay_out(double n, Progress* progress) {
@@ -68,7 +68,7 @@ void HoleSource::lay_out(double n, Progress* progress) {
     const auto all = static_cast<std::size_t>(n);
     std::vector<double> radii(all), sorted(all);
     for (std::size_t i = 0; i < all; ++i)
-        radii[i] = diameters_.hole(i).radius_m;
+        radii[i] = diameters_.radius_m(i);
     std::vector<std::size_t> order(all);
     std::iota(order.begin(), order.end(), std::size_t{0});
     std::stable_sort(order.begin(), order.end(),

@@ -156,7 +156,7 @@ PlacedHoles place_lattice(const Law& law, const Placement& p, const HoleRegion& 
         lattice_centers(region.tight(), std::get<LatticePattern>(p.pattern).spacing_m);
     for (std::size_t i = 0; i < nodes.size(); ++i)
         if (region.inside(nodes[i]) && thinning.keeps(i, nodes[i]))
-            placed.holes.push_back({nodes[i], diameters.hole(i).radius_m});
+            placed.holes.push_back({nodes[i], diameters.radius_m(i)});
     return placed;
 }
 
@@ -232,10 +232,14 @@ public:
             refuse_thin(p_);
         if (n < next_)
             return;
+        // Once the gain falls, each doubling of their number takes away less than the one before.
         const double gain = porosity - before_;
-        if (gain < 0.1 * porosity && gain < 0.01 * (*p_.porosity - porosity))
+        const double n_doublings = (*p_.porosity - porosity) / gain;
+        const double n_needed = static_cast<double>(n_tried) * std::exp2(n_doublings);
+        if (gain / porosity < 0.2 && n_needed > kMaxHoles)
             throw Error(Fault::numeric, "holes: " + std::to_string(n) +
-                                            " of them reach a porosity of " + shortest(porosity) +
+                                            " of them reach a porosity of " +
+                                            std::to_string(porosity) +
                                             " only, and more take hardly more away; widen the "
                                             "pattern or the shares, or ask for less");
         before_ = porosity;

@@ -212,6 +212,7 @@ TEST(LatticeCenters, FillTheMiddleOfTheBox) {
     EXPECT_NEAR(centers.front().y, 0.15, 1e-15);
     EXPECT_NEAR(centers.front().z, 0.175, 1e-15);
     EXPECT_NEAR(centers.back().x, 0.9, 1e-15);
+    EXPECT_EQ(lattice_centers({{0, 0, 0}, {0.3, 0.3, 0.3}}, 0.1).size(), 27u); // 0.3 / 0.1 < 3
 }
 
 TEST(PointProcess, FromLatticeToClustersTheNearestComesNearer) {

@@ -97,7 +97,7 @@ TEST(Patterns, ALatticeTakesASpacingOrADensity) {
     write_law(scratch);
     EXPECT_EQ(sample("--pattern lattice --spacing 20cm", scratch).size(), 125u);
     EXPECT_EQ(sample("--pattern lattice --spacing 25%", scratch).size(), 64u);
-    EXPECT_EQ(sample("--pattern lattice --density 1000.1", scratch).size(), 1000u);
+    EXPECT_EQ(sample("--pattern lattice --density 1000", scratch).size(), 1000u);
     EXPECT_EQ(sample("--pattern lattice", scratch).size(), 343u); // n_v of 400: every 13.6 cm
     EXPECT_THAT(read_file(scratch / "holes.csv"), HasSubstr("pattern lattice (chosen): spacing"));
     write_law(scratch, "all.json", "");

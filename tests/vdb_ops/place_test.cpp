@@ -321,15 +321,10 @@ TEST(PlaceShares, ALevelSetLetsHolesInsideAlone) {
         for (const Sphere& h : holes)
             EXPECT_LT(length(h.center), 0.401) << pattern_name(pattern);
     }
-    const auto lattice = place_holes(Law::constant(0.4),
-                                     with(LatticePattern{0.1},
-                                          [&] {
-                                              Placement q;
-                                              q.where = part;
-                                              return q;
-                                          }()),
-                                     Box{{-1, -1, -1}, {1, 1, 1}})
-                             .holes;
+    p.count.reset();
+    const auto lattice =
+        place_holes(Law::constant(0.4), with(LatticePattern{0.1}, p), Box{{-1, -1, -1}, {1, 1, 1}})
+            .holes;
     for (const Sphere& h : lattice)
         EXPECT_LT(length(h.center), 0.401);
     EXPECT_GT(lattice.size(), 200u); // 268 cells
