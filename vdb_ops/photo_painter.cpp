@@ -22,11 +22,11 @@ constexpr int kRays = 6;                 // to the sky from each of them
 
 /// The grain of the stone in its plane, coordinates in pixels: a factor about 1.
 class Grain {
-    static constexpr double kTone = 0.03; // steps too small to see, which keep the files small
+    static constexpr double kTone = 0.04; // steps too small to see, which keep the files small
 public:
     double at(double x, double y) const {
         const double sum = 0.12 * smooth(x / 43, y / 43, 0) + 0.07 * smooth(x / 12, y / 12, 1) +
-                           0.045 * smooth(x / 3.5, y / 3.5, 2) + crystal(x / 9, y / 9);
+                           0.04 * smooth(x / 5, y / 5, 2) + crystal(x / 9, y / 9);
         return 1 + std::round(sum / kTone) * kTone;
     }
 

@@ -54,10 +54,11 @@ Sizes sizes_of(const SectionPhotoSettings& s, const Box& box, double voxel_m) {
                " m holes show from " + shortest(smallest) +
                " m on; make these smaller, or it larger");
     const Vec3 size = box.size();
-    sizes.bar_m = s.scale_bar_m.value_or(round_length(0.5 * std::min({size.x, size.y, size.z})));
+    sizes.bar_m = s.scale_bar_m.value_or(round_length(0.25 * std::min({size.x, size.y, size.z})));
+    // The last bits of a cosine depend on the machine; marks and masks shall not.
     const double angle = s.tilt_deg * std::numbers::pi / 180;
-    sizes.cosine = std::cos(angle);
-    sizes.sine = std::sin(angle);
+    sizes.cosine = std::round(std::cos(angle) * 0x1p40) * 0x1p-40;
+    sizes.sine = std::sqrt(1 - sizes.cosine * sizes.cosine);
     return sizes;
 }
 

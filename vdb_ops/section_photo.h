@@ -20,8 +20,8 @@ struct SectionPhotoSettings {
     double tilt_deg = 0;
     /// Nothing smaller is marked; at least 4 pixels and 2 voxels, which is also the default.
     std::optional<double> detection_limit_m = std::nullopt;
-    /// Length of the bar beside the stone, > 0; or 1, 2 or 5 times a power of ten, up to half of
-    /// the shortest side of the solid's box: the same for all its planes.
+    /// Length of the bar beside the stone, > 0; or 1, 2 or 5 times a power of ten, up to a quarter
+    /// of the shortest side of the solid's box: the same for all its planes.
     std::optional<double> scale_bar_m = std::nullopt;
 };
 
