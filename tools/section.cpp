@@ -53,12 +53,32 @@ struct PhotoFiles {
     }
 };
 
-/// What all photos of a run are together.
+/// What all photos of a run are together, and what they share.
 struct PhotoTotals {
     std::size_t n_photos = 0, n_marked = 0, n_small = 0, n_inside = 0, n_solid = 0;
-    double area_m2 = 0;
-    std::string masks; ///< as fit takes them
-    std::optional<SectionPhoto> last;
+    double area_m2 = 0, pixel_m = 0, detection_limit_m = 0, scale_bar_m = 0, area_factor = 1;
+    std::string labels, masks; ///< of the first, as fit takes them
+
+    void add(const SectionPhoto& photo, const PhotoFiles& files) {
+        constexpr std::size_t kMostTold = 3;
+        if (n_photos < kMostTold) {
+            labels += " " + files.labels.string();
+            masks += " " + base_name(files.picture) + "=" + files.mask.string();
+        } else if (n_photos == kMostTold) {
+            labels += " ...";
+            masks += " ...";
+        }
+        ++n_photos;
+        n_marked += photo.holes.size();
+        n_small += photo.n_small;
+        n_inside += photo.n_inside;
+        n_solid += photo.n_solid;
+        area_m2 += photo.area_m2;
+        pixel_m = photo.pixel_m;
+        detection_limit_m = photo.detection_limit_m;
+        scale_bar_m = photo.scale_bar.diameter;
+        area_factor = photo.area_factor;
+    }
 };
 
 void open_folder(const SectionArgs& args, const Console& console) {
@@ -89,7 +109,8 @@ PhotoTotals write_photos(const Section& cut, const openvdb::FloatGrid& solid,
             console.say("{}: the plane misses the solid: no photo", files.picture.string());
             continue;
         }
-        SectionPhoto photo = section_photo(solid, known, cut.planes[i], settings, console.progress);
+        const SectionPhoto photo =
+            section_photo(solid, known, cut.planes[i], settings, console.progress);
         write_image(files.picture, photo.picture);
         write_image(files.mask, photo.mask);
         std::vector<Segment> segments = photo.holes;
@@ -98,16 +119,7 @@ PhotoTotals write_photos(const Section& cut, const openvdb::FloatGrid& solid,
                                                 photo.picture.height, segments));
         console.say("{}: {} x {} pixels, {} holes marked", files.labels.string(),
                     photo.picture.width, photo.picture.height, photo.holes.size());
-        ++totals.n_photos;
-        totals.n_marked += photo.holes.size();
-        totals.n_small += photo.n_small;
-        totals.n_inside += photo.n_inside;
-        totals.n_solid += photo.n_solid;
-        totals.area_m2 += photo.area_m2;
-        if (totals.n_photos <= 3)
-            totals.masks +=
-                fmt::format(" --mask {}={}", base_name(files.picture), files.mask.string());
-        totals.last = std::move(photo);
+        totals.add(photo, files);
     }
     return totals;
 }
@@ -121,34 +133,28 @@ void tell_photos(const PhotoTotals& totals, const SectionArgs& args, const Conso
         console.say("{}: {} profiles of the table are solid here and not marked: a fit will miss "
                     "them; carve with --bubbles keep",
                     folder, totals.n_solid);
-    if (!totals.last)
+    if (totals.n_marked == 0)
         return;
-    const SectionPhoto& photo = *totals.last;
-    console.say("fit with: taihu fit {}/plane-*.json{}{} --scale-bar {:.10g}m --detection-limit "
-                "{:.10g}",
-                folder, totals.masks, totals.n_photos > 3 ? " --mask ..." : "",
-                photo.scale_bar.diameter, photo.detection_limit_m);
-    if (photo.area_factor > 1)
+    console.say("fit with: taihu fit{} --mask{} --scale-bar {:.10g}m --detection-limit {:.10g}",
+                totals.labels, totals.masks, totals.scale_bar_m, totals.detection_limit_m);
+    if (totals.area_factor > 1)
         console.say("the tilt shortens the area that they show: fit with --area-factor {:.6g}, or "
                     "holes per volume come out {:.1f} % too many",
-                    photo.area_factor, 100 * (photo.area_factor - 1));
+                    totals.area_factor, 100 * (totals.area_factor - 1));
 }
 
 nlohmann::ordered_json photos_json(const PhotoTotals& totals, const SectionArgs& args) {
-    nlohmann::ordered_json json = {{"folder", args.photos.folder.string()},
-                                   {"photos", totals.n_photos},
-                                   {"marked", totals.n_marked},
-                                   {"small", totals.n_small},
-                                   {"inside", totals.n_inside},
-                                   {"solid", totals.n_solid},
-                                   {"area_m2", totals.area_m2}};
-    if (totals.last) {
-        json["pixel_m"] = totals.last->pixel_m;
-        json["detection_limit_m"] = totals.last->detection_limit_m;
-        json["scale_bar_m"] = totals.last->scale_bar.diameter;
-        json["area_factor"] = totals.last->area_factor;
-    }
-    return json;
+    return {{"folder", args.photos.folder.string()},
+            {"photos", totals.n_photos},
+            {"marked", totals.n_marked},
+            {"small", totals.n_small},
+            {"inside", totals.n_inside},
+            {"solid", totals.n_solid},
+            {"area_m2", totals.area_m2},
+            {"pixel_m", totals.pixel_m},
+            {"detection_limit_m", totals.detection_limit_m},
+            {"scale_bar_m", totals.scale_bar_m},
+            {"area_factor", totals.area_factor}};
 }
 
 nlohmann::ordered_json section_json(const Section& cut, std::ptrdiff_t n_clipped,
@@ -177,6 +183,27 @@ void tell(const Section& cut, std::ptrdiff_t n_clipped, const SectionArgs& args,
         console.say("{} profiles are open to the air: larger than they look", n_clipped);
 }
 
+/// What a run reads.
+struct Inputs {
+    Solid solid, base;
+    std::vector<Sphere> holes;
+    SectionKnown known;
+};
+
+void read_inputs(const SectionArgs& args, const Console& console, Inputs& in) {
+    in.solid = read_solid(args.solid, console);
+    if (!args.base.empty()) {
+        SolidOptions options = args.solid;
+        options.path = args.base;
+        in.base = read_solid(options, console);
+        in.known.base = in.base.grid.get();
+    }
+    if (!args.holes.empty()) {
+        in.holes = read_holes(args.holes);
+        in.known.holes = in.holes;
+    }
+}
+
 void run(SectionArgs args, const Console& console) {
     const bool has_photos = !args.photos.folder.empty();
     if (args.out.empty() && !has_photos)
@@ -188,22 +215,10 @@ void run(SectionArgs args, const Console& console) {
         open_folder(args, console);
     if (!args.direction.empty())
         args.settings.direction = {args.direction[0], args.direction[1], args.direction[2]};
-    const Solid solid = read_solid(args.solid, console);
-    const SectionPhotoSettings photo_settings = args.photos.settings(solid.measure);
-    SectionKnown known;
-    Solid base;
-    if (!args.base.empty()) {
-        SolidOptions options = args.solid;
-        options.path = args.base;
-        base = read_solid(options, console);
-        known.base = base.grid.get();
-    }
-    std::vector<Sphere> holes;
-    if (!args.holes.empty()) {
-        holes = read_holes(args.holes);
-        known.holes = holes;
-    }
-    const Section cut = section(*solid.grid, known, args.settings, console.progress);
+    Inputs in;
+    read_inputs(args, console, in);
+    const SectionPhotoSettings photo_settings = args.photos.settings(in.solid.measure);
+    const Section cut = section(*in.solid.grid, in.known, args.settings, console.progress);
     const auto n_clipped = std::count_if(cut.profiles.begin(), cut.profiles.end(),
                                          [](const Profile& p) { return p.clipped; });
     auto json = section_json(cut, n_clipped, args.out.string());
@@ -213,7 +228,7 @@ void run(SectionArgs args, const Console& console) {
     }
     if (has_photos) {
         const PhotoTotals totals =
-            write_photos(cut, *solid.grid, known, args, photo_settings, console);
+            write_photos(cut, *in.solid.grid, in.known, args, photo_settings, console);
         tell_photos(totals, args, console);
         json["photos"] = photos_json(totals, args);
     }

@@ -14,6 +14,7 @@ namespace {
 
 constexpr std::uint32_t kGrainStream = 0x67726169;
 constexpr Vec3 kStone{0.47, 0.445, 0.40}, kBackground{0.80, 0.81, 0.82}; // linear light
+constexpr double kTone = 0.04; // of the grain: steps hardly to be seen, which keep files small
 constexpr double kKey = 0.4, kSky = 0.6; // of the light that a cut face gets
 constexpr double kInside = 0.5;          // weathered walls are darker than a cut,
 constexpr double kFade = 12;             // and half as bright this deep [pixels]: a soft rim
@@ -22,7 +23,6 @@ constexpr int kRays = 6;                 // to the sky from each of them
 
 /// The grain of the stone in its plane, coordinates in pixels: a factor about 1.
 class Grain {
-    static constexpr double kTone = 0.04; // steps too small to see, which keep the files small
 public:
     double at(double x, double y) const {
         const double sum = 0.12 * smooth(x / 43, y / 43, 0) + 0.07 * smooth(x / 12, y / 12, 1) +
@@ -73,6 +73,7 @@ public:
         }
     }
 
+    /// One look where all around is stone, or all background; several on edges and in holes.
     Vec3 pixel(int x, int y) const {
         const int i = frame_.x0 + x, j = frame_.y0 + y;
         const std::uint8_t kind = scene_.image.kind_at(i, j);

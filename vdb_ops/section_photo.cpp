@@ -1,6 +1,8 @@
 #include "vdb_ops/section_photo.h"
 
 #include <algorithm>
+#include <array>
+#include <charconv>
 #include <cmath>
 #include <numbers>
 #include <string>
@@ -16,11 +18,20 @@ namespace {
 constexpr double kMostPixels = 1 << 24;
 constexpr double kDefaultSide = 800;                // pixels along the longest axis
 constexpr int kFewestPixels = 4, kFewestVoxels = 2; // across the smallest mark
+constexpr int kShortestBar = 8;                     // pixels
 constexpr double kMostTilt = 80;
 constexpr int kMargin = 16; // pixels of background all round
 
 [[noreturn]] void refuse(const std::string& what) {
     throw Error(Fault::bad_argument, "section photo: " + what);
+}
+
+/// For people: three digits.
+std::string rounded(double value) {
+    std::array<char, 32> text{};
+    const auto written =
+        std::to_chars(text.data(), text.data() + text.size(), value, std::chars_format::general, 3);
+    return {text.data(), written.ptr};
 }
 
 /// The settings with what was left open.
@@ -55,6 +66,10 @@ Sizes sizes_of(const SectionPhotoSettings& s, const Box& box, double voxel_m) {
                " m on; make these smaller, or it larger");
     const Vec3 size = box.size();
     sizes.bar_m = s.scale_bar_m.value_or(round_length(0.25 * std::min({size.x, size.y, size.z})));
+    if (sizes.bar_m < kShortestBar * sizes.pixel_m)
+        refuse("pixel_m is " + shortest(sizes.pixel_m) + ", with which the scale bar of " +
+               shortest(sizes.bar_m) +
+               " m is less than 8 pixels; choose smaller pixels or a longer bar");
     // The last bits of a cosine depend on the machine; marks and masks shall not.
     const double angle = s.tilt_deg * std::numbers::pi / 180;
     sizes.cosine = std::round(std::cos(angle) * 0x1p40) * 0x1p-40;
@@ -65,12 +80,12 @@ Sizes sizes_of(const SectionPhotoSettings& s, const Box& box, double voxel_m) {
 void check_size(double width, double height, double pixel_m) {
     if (width * height <= kMostPixels)
         return;
-    // A little more than needed, as the margin grows beside the smaller picture.
+    // Some more than needed, as the margin does not shrink with the picture.
     const double enough = 1.05 * pixel_m * std::sqrt(width / kMostPixels) * std::sqrt(height);
-    refuse("pixel_m is " + shortest(pixel_m) + ", which makes a picture of " +
-           shortest(std::ceil(width)) + " x " + shortest(std::ceil(height)) +
-           " pixels, of which at most 16777216 are drawn; choose pixels from " +
-           shortest(std::ceil(enough * 1e6) / 1e6) + " m on");
+    refuse("pixel_m is " + shortest(pixel_m) + ", which makes a picture of " + rounded(width) +
+           " x " + rounded(height) +
+           " pixels, of which at most 16777216 are drawn; choose pixels from " + rounded(enough) +
+           " m on");
 }
 
 /// The part of the plane that may show the solid, pixels as the eye sees them.
@@ -83,7 +98,7 @@ PlaneImage empty_image(const Box& box, const SectionPlane& plane, const Sizes& s
     check_size(nu, nv, sizes.pixel_m);
     if (sizes.bar_m > 2 * u_half)
         refuse("scale_bar_m is " + shortest(sizes.bar_m) + ", longer than the picture, which is " +
-               shortest(2 * u_half) + " m wide; choose a shorter one");
+               rounded(2 * u_half) + " m wide; choose a shorter one");
     image.nu = static_cast<int>(nu);
     image.nv = static_cast<int>(nv);
     const Vec3 middle = box.center() - plane.origin;
@@ -107,12 +122,13 @@ Segment mark_of(const RegionEllipse& e, double pixel_m) {
 
 /// Which of the circles, sorted by their left ends, lie wholly inside another. Of equal ones the
 /// first is seen.
-std::vector<bool> find_inside(const std::vector<Circle>& circles) {
+std::vector<bool> find_inside(const std::vector<Circle>& circles, const Progress* progress) {
     double greatest = 0;
     for (const Circle& c : circles)
         greatest = std::max(greatest, c.radius);
     std::vector<bool> inside(circles.size());
     for (std::size_t i = 0; i < circles.size(); ++i) {
+        check_cancelled(progress);
         const Circle& c = circles[i];
         const auto left = [](const Circle& o) { return o.u - o.radius; };
         for (std::size_t k = i;
@@ -126,7 +142,7 @@ std::vector<bool> find_inside(const std::vector<Circle>& circles) {
 /// The holes of the list, each as its circle.
 void mark_circles(std::span<const Sphere> holes, const openvdb::FloatGrid& solid,
                   const SectionPlane& plane, const PlaneImage& image, const Sizes& sizes,
-                  SectionPhoto& photo) {
+                  SectionPhoto& photo, const Progress* progress) {
     std::vector<Circle> circles;
     for (const Sphere& hole : holes) {
         const Circle c = circle_of(hole, plane);
@@ -140,7 +156,7 @@ void mark_circles(std::span<const Sphere> holes, const openvdb::FloatGrid& solid
     std::stable_sort(circles.begin(), circles.end(), [](const Circle& a, const Circle& b) {
         return a.u - a.radius < b.u - b.radius;
     });
-    const std::vector<bool> inside = find_inside(circles);
+    const std::vector<bool> inside = find_inside(circles, progress);
     const SolidSampler rock(solid);
     for (std::size_t i = 0; i < circles.size(); ++i) {
         const Circle& c = circles[i];
@@ -241,7 +257,7 @@ SectionPhoto section_photo(const openvdb::FloatGrid& solid, const SectionKnown& 
     photo.detection_limit_m = sizes.limit_m;
     photo.area_factor = 1 / sizes.cosine;
     if (known.holes)
-        mark_circles(*known.holes, solid, plane, image, sizes, photo);
+        mark_circles(*known.holes, solid, plane, image, sizes, photo, progress);
     else
         mark_regions(image, sizes, photo);
 

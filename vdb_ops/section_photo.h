@@ -20,8 +20,8 @@ struct SectionPhotoSettings {
     double tilt_deg = 0;
     /// Nothing smaller is marked; at least 4 pixels and 2 voxels, which is also the default.
     std::optional<double> detection_limit_m = std::nullopt;
-    /// Length of the bar beside the stone, > 0; or 1, 2 or 5 times a power of ten, up to a quarter
-    /// of the shortest side of the solid's box: the same for all its planes.
+    /// Length of the bar beside the stone, at least 8 pixels; or 1, 2 or 5 times a power of ten, up
+    /// to a quarter of the shortest side of the solid's box: the same for all its planes.
     std::optional<double> scale_bar_m = std::nullopt;
 };
 
@@ -42,7 +42,7 @@ struct SectionPhoto {
 /// Cut a solid by a plane and look at what lies behind the cut: pale stone with its grain, holes
 /// with their depth, a flat background and a scale bar. Orthographic: u runs to the right, v
 /// upwards, and a tilt shortens v by its cosine, so that a circle is seen as an ellipse whose major
-/// axis keeps the diameter (SEEDS E47).
+/// axis keeps the diameter.
 ///
 /// With the list of holes, marks are the exact circles whose centre lies in the mask, as far as
 /// they are seen: not those inside another, nor where the solid is solid at their centre (because
@@ -54,7 +54,7 @@ struct SectionPhoto {
 /// \param plane  of section().
 /// \throws Error bad_argument: a setting out of range, a bar longer than the picture, more than
 ///         2^24 pixels, the solid or the base is no level set, or empty; numeric: no pixel of the
-///         plane lies in the solid; cancelled: within 64 rows.
+///         plane lies in the solid; cancelled: within a row of pixels.
 SectionPhoto section_photo(const openvdb::FloatGrid& solid, const SectionKnown& known,
                            const SectionPlane& plane, const SectionPhotoSettings& settings = {},
                            Progress* progress = nullptr);

@@ -151,8 +151,10 @@ TEST(SectionVerb, PhotosNeedNoListAndNoTable) {
             scratch.path());
     EXPECT_EQ(said.exit_code, 0) << said.err;
     EXPECT_THAT(said.err, HasSubstr("new/folder/plane-2.json: "));
-    EXPECT_THAT(said.err, HasSubstr("fit with: taihu fit new/folder/plane-*.json --mask "
-                                    "plane-1.png=new/folder/plane-1-mask.png"));
+    EXPECT_THAT(said.err,
+                HasSubstr("fit with: taihu fit new/folder/plane-1.json new/folder/plane-2.json "
+                          "--mask plane-1.png=new/folder/plane-1-mask.png "
+                          "plane-2.png=new/folder/plane-2-mask.png --scale-bar 0.5m"));
     EXPECT_THAT(said.err, HasSubstr("fit with --area-factor 1.10338"));
     const json object = json::parse(said.out);
     EXPECT_FALSE(object.contains("file"));

@@ -215,10 +215,12 @@ TEST(SectionPhoto, RefusesByName) {
     fails("pixel_m is 0; must be", {.pixel_m = 0});
     fails("scale_bar_m is -1; must be", {.scale_bar_m = -1});
     fails("scale_bar_m is 3, longer than the picture, which is 2 m", {.scale_bar_m = 3});
+    fails("pixel_m is 0.1, with which the scale bar of 0.5 m is less than 8 pixels",
+          {.pixel_m = 0.1});
     fails("detection_limit_m is 0.02; with pixels of 0.01 m and voxels of 0.05 m holes show from "
           "0.1 m on",
           {.pixel_m = 0.01, .detection_limit_m = 0.02});
-    fails("pixel_m is 1e-04, which makes a picture of 20003 x 20003", {.pixel_m = 1e-4});
+    fails("pixel_m is 1e-04, which makes a picture of 2e+04 x 2e+04", {.pixel_m = 1e-4});
     fails("at most 16777216 are drawn; choose pixels from ", {.pixel_m = 1e-200});
     SectionPlane beside = plane_of({0, 0, 1});
     beside.origin.z = 5;
