@@ -103,8 +103,8 @@ std::string plot_sections(const Sample& sample, const LawRanking& ranking,
     const std::size_t n_laws = std::min<std::size_t>(ranking.fits.size(), kMostLaws);
     std::string script = kLook;
     script += fmt::format("set xlabel 'diameter of the section [{}]'\nset ylabel 'density of "
-                          "{}'\nset xrange [0:{:.6g}]\nset yrange [0:*]\n",
-                          unit.name, unit.name, end * unit.factor);
+                          "sections'\nset xrange [0:{:.6g}]\nset yrange [0:*]\n",
+                          unit.name, end * unit.factor);
     script += "plot '-' using 1:2:3 with boxes fs solid 1 lc rgb '#d9cfb8' title 'marked'";
     for (std::size_t i = n_laws; i-- > 0;) // the best on top
         script +=
