@@ -90,6 +90,7 @@ void add_lod(CLI::App& app, Console& console);
 void add_measure(CLI::App& app, Console& console);
 void add_mesh(CLI::App& app, Console& console);
 void add_render(CLI::App& app, Console& console);
+void add_rock(CLI::App& app, Console& console);
 void add_sample(CLI::App& app, Console& console);
 void add_section(CLI::App& app, Console& console);
 void add_shape(CLI::App& app, Console& console);

@@ -83,6 +83,7 @@ int run(int argc, char** argv) {
     add_shape(app, console);
     add_voxelize(app, console);
     add_carve(app, console);
+    add_rock(app, console);
     add_mesh(app, console);
     add_lod(app, console);
     add_check(app, console);

@@ -4,6 +4,7 @@
 #include "stats/core/error.h"
 #include "stats/core/file.h"
 #include "stats/core/sha256.h"
+#include "vdb_ops/level_set_box.h"
 #include "vdb_ops/rasterize.h"
 #include "vdb_ops/recipe.h"
 #include "vdb_ops/vdb_file.h"
@@ -12,20 +13,9 @@
 namespace taihu {
 namespace {
 
-/// Length of the longest axis of what lies inside: an inside voxel's own distance leads on to the
-/// surface, so the voxel size does not show.
 double longest_m(const openvdb::FloatGrid& grid) {
-    const double voxel = grid.voxelSize().x();
-    Box box;
-    for (auto leaf = grid.tree().cbeginLeaf(); leaf; ++leaf)
-        for (auto v = leaf->cbeginValueOn(); v; ++v)
-            if (*v < 0) {
-                const openvdb::Coord c = v.getCoord();
-                const Vec3 p{double(c.x()), double(c.y()), double(c.z())}, d{1, 1, 1};
-                box.include(p + d * (*v / voxel));
-                box.include(p - d * (*v / voxel));
-            }
-    return box.empty() ? 0 : box.longest() * voxel;
+    const Box box = level_set_box(grid);
+    return box.empty() ? 0 : box.longest();
 }
 
 std::string lower_extension(const std::filesystem::path& path) {

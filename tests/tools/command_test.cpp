@@ -13,8 +13,9 @@ using testing::HasSubstr;
 using testing::IsEmpty;
 using testing::StartsWith;
 
-const std::vector<std::string> kVerbs = {"fit", "sample", "shape",   "voxelize", "carve",  "mesh",
-                                         "lod", "check",  "measure", "section",  "render", "info"};
+const std::vector<std::string> kVerbs = {"fit",    "sample", "shape", "voxelize", "carve",
+                                         "mesh",   "lod",    "check", "measure",  "section",
+                                         "render", "info",   "rock"};
 
 long lines(const std::string& text) {
     return std::count(text.begin(), text.end(), '\n');

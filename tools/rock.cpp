@@ -1,0 +1,210 @@
+// taihu rock: a whole recipe, made.
+#include <chrono>
+
+#include "mesh_out/lod.h"
+#include "stats/core/error.h"
+#include "stats/core/file.h"
+#include "stats/core/text.h"
+#include "stats/io/holes_file.h"
+#include "tools/presets.h"
+#include "tools/solid_files.h"
+#include "vdb_ops/recipe_solid.h"
+#include "vdb_ops/vdb_file.h"
+
+namespace taihu {
+namespace {
+
+constexpr double kCoarse = 4; // voxels of a dry run, times those of the run itself
+
+struct RockArgs {
+    std::filesystem::path recipe, from, out, report, holes;
+    std::string preset, voxel, height;
+    std::optional<int> dim;
+    std::optional<std::uint64_t> seed;
+    std::vector<std::string> settings;
+    std::vector<std::filesystem::path> assets;
+    SurfaceOptions surface;
+    bool dry_run = false, list = false;
+};
+
+/// The recipe's text, a name for it, and the folders where its files may be.
+struct Source {
+    std::string text, where;
+    std::vector<std::filesystem::path> folders;
+};
+
+/// The recipe that a solid or mesh carries.
+std::string carried_recipe(const std::filesystem::path& path, const Console& console) {
+    const std::string recipe =
+        is_vdb(path) ? read_vdb(path).recipe : read_mesh(path, {}, console.progress).recipe;
+    if (!recipe_solid(recipe))
+        throw Error(Fault::bad_input,
+                    path.string() + ": carries no recipe; only files that taihu wrote do");
+    return recipe;
+}
+
+Source source_of(const RockArgs& args, const Console& console) {
+    const int n = !args.recipe.empty() + !args.from.empty() + !args.preset.empty();
+    if (n != 1)
+        throw Error(Fault::bad_argument,
+                    "rock: say what to make: a recipe (.json), --preset NAME or --from FILE");
+    Source source;
+    if (!args.preset.empty())
+        return {preset_recipe(args.preset), "preset " + args.preset, args.assets};
+    const std::filesystem::path& file = args.recipe.empty() ? args.from : args.recipe;
+    source.text = args.recipe.empty() ? carried_recipe(file, console) : read_file(file);
+    source.where = base_name(file);
+    source.folders = {file.has_parent_path() ? file.parent_path() : "."};
+    source.folders.insert(source.folders.end(), args.assets.begin(), args.assets.end());
+    return source;
+}
+
+void change(Source& source, const RockArgs& args) {
+    for (const std::string& setting : args.settings) {
+        const std::size_t equals = setting.find('=');
+        if (equals == std::string::npos || equals == 0)
+            throw Error(Fault::bad_argument, "--set: '" + printable(setting) +
+                                                 "' must be a key and a value, as porosity=0.4");
+        source.text = with_setting(source.text, source.where, setting.substr(0, equals),
+                                   setting.substr(equals + 1));
+    }
+}
+
+RecipeSettings recipe_settings(const RockArgs& args) {
+    RecipeSettings s;
+    s.dim = args.dim;
+    s.seed = args.seed;
+    if (!args.voxel.empty())
+        s.voxel_m = length_m("--voxel", args.voxel);
+    if (!args.height.empty())
+        s.height_m = length_m("--height", args.height);
+    return s;
+}
+
+void list_presets(const Console& console) {
+    nlohmann::ordered_json json;
+    for (const Preset& p : presets()) {
+        const auto recipe = nlohmann::ordered_json::parse(p.recipe);
+        const std::string about = recipe.value("about", "");
+        const auto set = recipe.value("set", nlohmann::ordered_json::object());
+        std::string names;
+        for (const auto& [name, path] : set.items())
+            names += (names.empty() ? "" : ", ") + name;
+        json[std::string(p.name)] = {{"about", about}, {"set", names}};
+        if (!console.json)
+            fmt::print("{:<18} {}{}\n", p.name, about,
+                       names.empty() ? "" : " (--set " + names + ")");
+    }
+    console.result(json);
+}
+
+/// How much a run will need, by a coarser one.
+void estimate(const Source& source, const RecipeAssets& assets, RecipeSettings settings,
+              const Console& console) {
+    const auto start = std::chrono::steady_clock::now();
+    settings.coarsen = kCoarse;
+    const RecipeSolid coarse =
+        make_recipe(source.text, source.where, assets, settings, console.progress);
+    const std::chrono::duration<double> took = std::chrono::steady_clock::now() - start;
+    const double leaves = kCoarse * kCoarse * static_cast<double>(coarse.solid->tree().leafCount());
+    const double bytes = 2200 * leaves; // 512 floats, a mask and its place in the tree
+    const double voxel_m = coarse.voxel_m / kCoarse;
+    console.say("{}: voxel {:.4g} m, about {:.0f} leaves, {:.0f} MB of level set, {:.1f} s to make "
+                "it on this machine",
+                source.where, voxel_m, leaves, bytes / 1e6, kCoarse * kCoarse * took.count());
+    console.result({{"voxel_m", voxel_m}, {"leaves", leaves}, {"bytes", bytes}});
+}
+
+nlohmann::ordered_json write_levels(const RockArgs& args, const RecipeSolid& made,
+                                    const Console& console) {
+    LodSettings settings;
+    settings.n_levels = made.lod->n_levels;
+    settings.bound_m = made.lod->bound_m;
+    settings.factor = made.lod->factor;
+    const LodChain chain = make_lods(*made.solid, settings, console.progress);
+    const std::string report = format_report(chain, base_name(args.out));
+    write_file(args.out, format_glb(chain, {.recipe = made.recipe}));
+    for (std::size_t j = 0; j < chain.levels.size(); ++j)
+        console.say("{}: level {}: {} triangles, {} bytes, error {:.3g} m", args.out.string(), j,
+                    chain.levels[j].certificate.n_triangles, chain.levels[j].encoded.draco.size(),
+                    chain.levels[j].error_m);
+    if (!args.report.empty()) {
+        write_file(args.report, report);
+        console.say("{}: the figures of each level", args.report.string());
+    }
+    return nlohmann::ordered_json::parse(report);
+}
+
+void run(const RockArgs& args, const Console& console) {
+    if (args.list)
+        return list_presets(console);
+    if (args.out.empty() && !args.dry_run)
+        throw Error(Fault::bad_argument,
+                    "rock: say where to write it, as -o rock.glb, or --dry-run");
+    if (!args.out.empty()) {
+        check_solid_path(args.out);
+        console.may_write(args.out, {args.recipe, args.from});
+        args.surface.check(args.out);
+    }
+    if (!args.holes.empty())
+        console.may_write(args.holes, {args.recipe, args.from, args.out});
+    Source source = source_of(args, console);
+    change(source, args);
+    const RecipeAssets assets{
+        source.folders, [&](const std::filesystem::path& file, double unit_m, bool z_up) {
+            return read_mesh(file, {unit_m, z_up ? UpAxis::z : UpAxis::y}, console.progress)
+                .levels.front();
+        }};
+    if (args.dry_run)
+        return estimate(source, assets, recipe_settings(args), console);
+    const RecipeSolid made =
+        make_recipe(source.text, source.where, assets, recipe_settings(args), console.progress);
+    console.say_all(args.out.string(), made.found);
+    if (!args.holes.empty()) {
+        const std::vector<std::string> comments = {"holes of " + source.where};
+        write_file(args.holes, format_holes(made.holes, comments));
+        console.say("{}: {} holes", args.holes.string(), made.holes.size());
+    }
+    const bool levels = made.lod && mesh_format(args.out) == MeshFormat::glb;
+    if (!levels && !args.report.empty())
+        throw Error(Fault::bad_argument, "--report: is of levels of detail; write a .glb of a "
+                                         "recipe that has 'lod'");
+    console.result(levels ? write_levels(args, made, console)
+                          : write_solid(args.out, *made.solid, made.recipe, args.surface, console));
+}
+
+} // namespace
+
+void add_rock(CLI::App& app, Console& console) {
+    auto args = std::make_shared<RockArgs>();
+    auto* verb = console.verb(
+        app, "rock", "Make a rock by a recipe: a preset, a file, or what another file carries",
+        "  taihu rock --preset taihu --height 1.8m --seed 7 -o rock.glb\n"
+        "  taihu rock --preset sponge --set porosity=0.6 --dim 200 -o sponge.vdb\n"
+        "  taihu rock my_recipe.json --dry-run\n"
+        "  taihu rock --from rock.glb --assets meshes -o again.glb");
+    verb->add_option("recipe", args->recipe, "Recipe (.json)");
+    verb->add_option("--preset", args->preset, "or one that comes with taihu: see --list");
+    verb->add_option("--from", args->from, "or that of a solid or mesh that taihu wrote");
+    verb->add_flag("--list", args->list, "Print the presets and what --set changes in them");
+    verb->add_option("-o,--output", args->out, "Where to write it (.vdb .obj .ply .stl .off .glb)");
+    verb->add_option("--report", args->report, "Where to write the figures of the levels (.json)");
+    verb->add_option("--holes", args->holes, "Where to write the holes that were carved (.csv)");
+    verb->add_option("--height", args->height, "Scale all of it to this height: 1.8m");
+    verb->add_option("--seed", args->seed,
+                     "Of all that has no seed of its own [the recipe's, or 0]")
+        ->check(CLI::Range(0.0, 9.2e18));
+    verb->add_option("--set", args->settings,
+                     "KEY=VALUE, a name from --list or a path in the recipe; may be repeated")
+        ->take_all();
+    auto* dim = verb->add_option("--dim", args->dim,
+                                 "Voxels along the longest axis, 4..65536 [the recipe's, or 256]")
+                    ->check(CLI::Range(4, 65536));
+    verb->add_option("--voxel", args->voxel, "or the size of a voxel, as 5mm")->excludes(dim);
+    verb->add_option("--assets", args->assets, "More folders with the recipe's files");
+    verb->add_flag("--dry-run", args->dry_run, "Say what it will need, and make nothing");
+    args->surface.add_options(*verb);
+    verb->callback([args, &console] { console.with_threads([&] { run(*args, console); }); });
+}
+
+} // namespace taihu

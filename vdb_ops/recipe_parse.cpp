@@ -1,0 +1,420 @@
+#include "vdb_ops/recipe_parse_detail.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+#include <span>
+
+#include <nlohmann/json.hpp>
+
+#include "stats/core/error.h"
+#include "stats/core/file.h"
+#include "stats/core/rng.h"
+#include "stats/core/sha256.h"
+#include "stats/core/text.h"
+#include "stats/io/holes_file.h"
+#include "stats/io/json_detail.h"
+#include "stats/io/law_file.h"
+#include "stats/number_detail.h"
+#include "vdb_ops/vdb_file.h"
+
+namespace taihu {
+namespace {
+
+using nlohmann::json;
+using Node = std::unique_ptr<RecipeNode>;
+
+constexpr std::uint32_t kSeedStream = 0x72637065;
+constexpr double kMost_m = 1e6; // lengths and places
+constexpr double kMostSeed = 1.8446744073709551e19;
+
+[[noreturn]] void refuse(const std::string& where, const std::string& what) {
+    throw Error(Fault::bad_input, where + ": " + what);
+}
+
+/// The body of a node, read key by key.
+class Keys {
+public:
+    Keys(const json& body, std::string where, std::initializer_list<std::string_view> required,
+         std::initializer_list<std::string_view> optional = {})
+        : body_(body), where_(std::move(where)) {
+        check_keys(body, where_, {required.begin(), required.size()},
+                   {optional.begin(), optional.size()});
+    }
+    const std::string& where() const { return where_; }
+    bool has(const char* key) const { return body_.contains(key); }
+    const json& value(const char* key) const { return body_.at(key); }
+
+    double number(const char* key, double lo, double hi) const {
+        return json_number(body_, where_, key, lo, hi);
+    }
+    double number_or(const char* key, double fallback, double lo, double hi) const {
+        return has(key) ? number(key, lo, hi) : fallback;
+    }
+    double length(const char* key) const { return number(key, 1e-9, kMost_m); }
+    std::string text(const char* key) const { return json_text(body_, where_, key); }
+    std::uint64_t whole(const char* key, double hi) const {
+        const double v = number(key, 0, hi);
+        if (v != std::floor(v))
+            refuse(where_,
+                   "'" + std::string(key) + "' is " + shortest(v) + "; must be a whole number");
+        return body_.at(key).is_number_unsigned() ? body_.at(key).get<std::uint64_t>()
+                                                  : static_cast<std::uint64_t>(v);
+    }
+    Vec3 vector(const char* key, double lo, double hi) const {
+        const json& v = body_.at(key);
+        const auto good = [&](const json& x) {
+            return x.is_number() && x.get<double>() >= lo && x.get<double>() <= hi;
+        };
+        if (!v.is_array() || v.size() != 3 || !std::all_of(v.begin(), v.end(), good))
+            refuse(where_, "'" + std::string(key) + "' is " + printable(v.dump(), 60) +
+                               "; must be three numbers in " + shortest(lo) + ".." + shortest(hi));
+        return {v[0].get<double>(), v[1].get<double>(), v[2].get<double>()};
+    }
+    template <class... Words>
+    std::string word(const char* key, const char* fallback, Words... words) const {
+        const std::string value = has(key) ? text(key) : fallback;
+        std::string list;
+        for (const std::string_view w : {std::string_view(words)...}) {
+            if (value == w)
+                return value;
+            list += (list.empty() ? "" : ", ") + std::string(w);
+        }
+        refuse(where_,
+               "'" + std::string(key) + "' is '" + printable(value) + "'; must be one of " + list);
+    }
+
+private:
+    const json& body_;
+    std::string where_;
+};
+
+/// A node made of one or more others.
+std::vector<Node> parse_children(const Keys& keys, RecipeParser& parser, std::size_t at_least) {
+    const json& of = keys.value("of");
+    std::vector<Node> nodes;
+    if (!of.is_array()) {
+        if (at_least > 1)
+            refuse(keys.where(),
+                   "'of' must be a list of " + std::to_string(at_least) + " nodes or more");
+        nodes.push_back(parse_node(of, keys.where() + ".of", parser));
+        return nodes;
+    }
+    for (std::size_t i = 0; i < of.size(); ++i)
+        nodes.push_back(parse_node(of[i], keys.where() + ".of[" + std::to_string(i) + "]", parser));
+    if (nodes.size() < at_least || (at_least == 1 && nodes.size() != 1))
+        refuse(keys.where(), "'of' has " + std::to_string(nodes.size()) + " nodes; it needs " +
+                                 (at_least == 1 ? "one" : std::to_string(at_least) + " or more"));
+    return nodes;
+}
+
+std::uint64_t seed_of(const Keys& keys, RecipeParser& parser) {
+    return keys.has("seed") ? keys.whole("seed", kMostSeed) : parser.next_seed();
+}
+
+/// A file's content, which must have the hash that the recipe says.
+std::filesystem::path asset(const Keys& keys, const char* key, const RecipeParser& parser) {
+    const std::string name = keys.text(key), sha256 = keys.text("sha256");
+    if (name.empty() || name != base_name(name) || name == "." || name == "..")
+        refuse(keys.where(), "'" + std::string(key) + "' is '" + printable(name) +
+                                 "'; must be a name without folders");
+    for (const std::filesystem::path& folder : parser.assets.folders) {
+        const std::filesystem::path path = folder / name;
+        std::error_code ignored;
+        if (!std::filesystem::is_regular_file(path, ignored))
+            continue;
+        const std::string found = sha256_hex(read_file(path));
+        if (found != sha256)
+            refuse(keys.where(), "'" + name +
+                                     "' is another file than the one the recipe means "
+                                     "(its SHA-256 begins with " +
+                                     found.substr(0, 8) + ", not " +
+                                     printable(sha256.substr(0, 8)) +
+                                     "); find that one, or correct "
+                                     "sha256");
+        return path;
+    }
+    throw Error(Fault::io, keys.where() + ": there is no file '" + name +
+                               "' beside the recipe; put it there, or name its folder (--assets)");
+}
+
+Node parse_shape(ShapeKind kind, const json& body, const std::string& where, RecipeParser& parser) {
+    ShapeSettings s;
+    s.kind = kind;
+    const bool boulder = kind == ShapeKind::boulder;
+    const Keys keys = [&]() -> Keys {
+        switch (kind) {
+        case ShapeKind::torus:
+            return {body, where, {"size_m"}, {"tube_m"}};
+        case ShapeKind::icosphere:
+            return {body, where, {"size_m"}, {"subdivisions"}};
+        case ShapeKind::boulder:
+            return {body, where, {"size_m"}, {"subdivisions", "relief", "lumps", "seed"}};
+        case ShapeKind::rounded_box:
+            return {body, where, {"size_m"}, {"round_m"}};
+        case ShapeKind::superquadric:
+            return {body, where, {"size_m"}, {"vertical", "around"}};
+        default:
+            return {body, where, {"size_m"}};
+        }
+    }();
+    s.size_m = keys.vector("size_m", 1e-9, kMost_m);
+    s.tube_m = keys.number_or("tube_m", 0.25 * s.size_m.x, 1e-9, kMost_m);
+    s.round_m = keys.number_or("round_m", 0.2 * std::min({s.size_m.x, s.size_m.y, s.size_m.z}),
+                               1e-9, kMost_m);
+    s.vertical = keys.number_or("vertical", s.vertical, 0.1, 2);
+    s.around = keys.number_or("around", s.around, 0.1, 2);
+    if (keys.has("subdivisions"))
+        s.subdivisions = static_cast<int>(keys.whole("subdivisions", 8));
+    s.relief = keys.number_or("relief", s.relief, 0, 0.9);
+    s.lumps = keys.number_or("lumps", s.lumps, 0.1, 16);
+    if (boulder)
+        s.seed = seed_of(keys, parser);
+    return make_shape_node(s);
+}
+
+/// The half space below a plane: what its normal points away from.
+Node parse_plane(const json& body, const std::string& where, RecipeParser&) {
+    const Keys keys(body, where, {}, {"normal", "point_m"});
+    const Vec3 normal = keys.has("normal") ? keys.vector("normal", -1e6, 1e6) : Vec3{0, 1, 0};
+    const Vec3 point = keys.has("point_m") ? keys.vector("point_m", -kMost_m, kMost_m) : Vec3{};
+    const double n = length(normal);
+    if (!(n > 1e-9))
+        refuse(where, "'normal' has no length; give a direction");
+    // Turn +Y into the normal, about the axis across both.
+    const Vec3 axis = cross({0, 1, 0}, normal);
+    const double angle = std::atan2(length(axis), normal.y);
+    const Similarity turn = length(axis) > 1e-12 * n ? Similarity::rotation(axis, angle)
+                            : normal.y > 0           ? Similarity()
+                                           : Similarity::rotation({1, 0, 0}, std::numbers::pi);
+    return make_plane_node(Similarity::translation(point) * turn);
+}
+
+Node parse_mesh(const json& body, const std::string& where, RecipeParser& parser) {
+    const Keys keys(body, where, {"file", "sha256"}, {"unit_m", "up", "close"});
+    const auto path = asset(keys, "file", parser);
+    const double unit_m = keys.number_or("unit_m", 1, 1e-9, 1e9);
+    const bool z_up = keys.word("up", "y", "y", "z") == "z";
+    const bool open = keys.word("close", "loops", "loops", "none") == "none";
+    if (!parser.assets.read_mesh)
+        refuse(where, "nothing here reads mesh files; voxelize it first");
+    return make_mesh_node(parser.assets.read_mesh(path, unit_m, z_up), where,
+                          open ? CloseRule::none : CloseRule::loops);
+}
+
+Node parse_level_set(const json& body, const std::string& where, RecipeParser& parser) {
+    const Keys keys(body, where, {"file", "sha256"});
+    return make_level_set_node(read_vdb(asset(keys, "file", parser)).solid);
+}
+
+Node parse_combined(Combine how, const json& body, const std::string& where, RecipeParser& parser) {
+    const Keys keys(body, where, {"of"}, {"blend_m"});
+    const double blend_m = keys.number_or("blend_m", 0, 0, kMost_m);
+    return make_combined_node(how, parse_children(keys, parser, 2), blend_m);
+}
+
+Node parse_transform(const json& body, const std::string& where, RecipeParser& parser) {
+    const Keys keys(body, where, {"of"}, {"scale", "axis", "angle_deg", "move_m"});
+    Similarity by = Similarity::scaling(keys.number_or("scale", 1, 1e-9, 1e9));
+    if (keys.has("angle_deg") != keys.has("axis"))
+        refuse(where, "a turn needs 'axis' and 'angle_deg'; give both or none");
+    if (keys.has("axis"))
+        by = Similarity::rotation(keys.vector("axis", -1e6, 1e6),
+                                  keys.number("angle_deg", -3600, 3600) * std::numbers::pi / 180) *
+             by;
+    if (keys.has("move_m"))
+        by = Similarity::translation(keys.vector("move_m", -kMost_m, kMost_m)) * by;
+    return make_transform_node(std::move(parse_children(keys, parser, 1).front()), by);
+}
+
+Node parse_offset(const json& body, const std::string& where, RecipeParser& parser) {
+    const Keys keys(body, where, {"of", "by_m"});
+    return make_offset_node(std::move(parse_children(keys, parser, 1).front()),
+                            keys.number("by_m", -kMost_m, kMost_m));
+}
+
+Node parse_shell(const json& body, const std::string& where, RecipeParser& parser) {
+    const Keys keys(body, where, {"of"}, {"inwards_m", "outwards_m"});
+    return make_shell_node(std::move(parse_children(keys, parser, 1).front()),
+                           keys.number_or("inwards_m", 0, 0, kMost_m),
+                           keys.number_or("outwards_m", 0, 0, kMost_m));
+}
+
+Node parse_embed(const json& body, const std::string& where, RecipeParser& parser) {
+    const Keys keys(body, where, {"of"}, {"gap_m"});
+    return make_embed_node(parse_children(keys, parser, 2), keys.number_or("gap_m", 0, 0, kMost_m));
+}
+
+Node parse_clean(const json& body, const std::string& where, RecipeParser& parser) {
+    const Keys keys(body, where, {"of"}, {"pieces", "bubbles"});
+    CleanSettings settings;
+    if (keys.has("pieces") && keys.value("pieces") == "all")
+        settings.n_pieces.reset();
+    else if (keys.has("pieces"))
+        settings.n_pieces = std::max<std::size_t>(1, keys.whole("pieces", 1e9));
+    settings.fill_bubbles = keys.word("bubbles", "fill", "fill", "keep") == "fill";
+    return make_clean_node(std::move(parse_children(keys, parser, 1).front()), settings, where);
+}
+
+/// A law in the recipe itself, or that of a file.
+Law parse_hole_law(const Keys& keys, RecipeParser& parser) {
+    const json& law = keys.value("law");
+    if (law.is_object()) {
+        const Keys body(law, keys.where() + ".law", {"family", "parameters"});
+        const Family family = family_from_name(body.text("family"));
+        const auto names = parameter_names(family);
+        const json& parameters = body.value("parameters");
+        check_keys(parameters, body.where() + ".parameters", names);
+        std::vector<double> values;
+        for (const std::string_view name : names)
+            values.push_back(
+                json_number(parameters, body.where() + ".parameters", name, -1e12, 1e12));
+        return Law(family, values);
+    }
+    const LawFile file = read_law_file(asset(keys, "law", parser));
+    if (!keys.has("empirical") || keys.value("empirical") == false)
+        return file.law;
+    if (keys.value("empirical") != true)
+        refuse(keys.where(), "'empirical' must be true or false");
+    if (file.empirical.empty())
+        refuse(keys.where(), "the law has no table for 'empirical'; fit it again, or drop the key");
+    return Law::empirical(file.empirical);
+}
+
+Pattern parse_pattern(const json& pattern, const std::string& where) {
+    if (!pattern.is_object() || pattern.size() != 1)
+        refuse(where, "must be an object of one pattern");
+    const std::string kind = pattern.begin().key();
+    const json& body = pattern.begin().value();
+    const std::string inside = where + "." + printable(kind);
+    if (kind == "thomas" || kind == "matern") {
+        const Keys keys(body, inside, {"clusters_m3", "spread_m"});
+        return ClusterSettings{kind == "thomas" ? ClusterSettings::Shape::thomas
+                                                : ClusterSettings::Shape::matern,
+                               keys.number("clusters_m3", 1e-18, 1e18), keys.length("spread_m")};
+    }
+    if (kind == "joints") {
+        const Keys keys(body, inside, {"n", "scatter_m"});
+        return JointsPattern{static_cast<int>(keys.whole("n", 1000)), keys.length("scatter_m")};
+    }
+    if (kind == "hard_core") {
+        const Keys keys(body, inside, {"gap_m"});
+        return HardCorePattern{keys.number("gap_m", 0, kMost_m)};
+    }
+    if (kind == "lattice") {
+        const Keys keys(body, inside, {"spacing_m"});
+        return LatticePattern{keys.length("spacing_m")};
+    }
+    static constexpr std::string_view kKinds[] = {"thomas", "matern", "joints", "hard_core",
+                                                  "lattice"};
+    refuse(where, "unknown pattern '" + printable(kind) + "'" + did_you_mean(kind, kKinds));
+}
+
+Box parse_box(const Keys& keys) {
+    const json& v = keys.value("box_m");
+    if (!v.is_array() || v.size() != 2)
+        refuse(keys.where(), "'box_m' must be two corners");
+    const json corners = {{"lo", v[0]}, {"hi", v[1]}};
+    const Keys read(corners, keys.where() + ".box_m", {"lo", "hi"});
+    Box box;
+    box.include(read.vector("lo", -kMost_m, kMost_m));
+    box.include(read.vector("hi", -kMost_m, kMost_m));
+    return box;
+}
+
+Node parse_holes(const json& body, const std::string& where, RecipeParser& parser) {
+    if (body.is_object() && body.contains("file")) {
+        const Keys keys(body, where, {"file", "sha256"});
+        return make_holes_node(read_holes(asset(keys, "file", parser)));
+    }
+    const Keys keys(body, where, {"law"},
+                    {"sha256", "empirical", "count", "porosity", "density_m3", "scale_m", "seed",
+                     "pattern", "height", "where", "box_m"});
+    if (keys.value("law").is_string() != keys.has("sha256"))
+        refuse(where, "a law file has a 'sha256', a law in the recipe has none");
+    Placement p;
+    p.scale_m = keys.has("scale_m") ? keys.length("scale_m") : 1;
+    if (keys.has("count"))
+        p.count = keys.whole("count", 1e8);
+    if (keys.has("porosity"))
+        p.porosity = keys.number("porosity", 0, 0.95);
+    if (keys.has("density_m3"))
+        p.density_m3 = keys.number("density_m3", 1e-18, 1e18);
+    p.seed = seed_of(keys, parser);
+    if (keys.has("pattern"))
+        p.pattern = parse_pattern(keys.value("pattern"), where + ".pattern");
+    if (keys.has("height")) {
+        const json& h = keys.value("height");
+        if (!h.is_array() || h.size() != 2 || !h[0].is_number() || !h[1].is_number())
+            refuse(where, "'height' must be the shares at the bottom and at the top");
+        p.height = HeightShare{h[0].get<double>(), h[1].get<double>()};
+    }
+    if (keys.has("where")) {
+        const Keys file(keys.value("where"), where + ".where", {"file", "sha256"});
+        p.where = read_volume(asset(file, "file", parser));
+    }
+    std::optional<Box> box;
+    if (keys.has("box_m"))
+        box = parse_box(keys);
+    return make_holes_node(parse_hole_law(keys, parser), p, box, where);
+}
+
+using Parse = Node (*)(const json&, const std::string&, RecipeParser&);
+
+template <Combine how>
+Node parse_combine(const json& body, const std::string& where, RecipeParser& parser) {
+    return parse_combined(how, body, where, parser);
+}
+
+Node parse_material(const json& body, const std::string& where, RecipeParser& parser) {
+    const Keys keys(body, where, {});
+    if (!parser.material)
+        refuse(where, "the recipe has no 'material'; add one beside 'solid'");
+    return parse_holes(*parser.material, "material", parser);
+}
+
+constexpr std::pair<std::string_view, Parse> kNodes[] = {
+    {"plane", parse_plane},
+    {"mesh", parse_mesh},
+    {"level_set", parse_level_set},
+    {"union", parse_combine<Combine::unite>},
+    {"intersection", parse_combine<Combine::intersect>},
+    {"difference", parse_combine<Combine::subtract>},
+    {"transform", parse_transform},
+    {"offset", parse_offset},
+    {"shell", parse_shell},
+    {"embed", parse_embed},
+    {"clean", parse_clean},
+    {"holes", parse_holes},
+    {"material", parse_material}};
+
+} // namespace
+
+std::uint64_t RecipeParser::next_seed() {
+    const auto w = Rng{seed, kSeedStream}.words(n_seeded++);
+    return std::uint64_t{w[0]} << 32 | w[1];
+}
+
+std::unique_ptr<RecipeNode> parse_node(const json& node, const std::string& where,
+                                       RecipeParser& parser) {
+    if (!node.is_object() || node.size() != 1)
+        refuse(where, "a node is an object with one key, its kind");
+    const std::string kind = node.begin().key();
+    const json& body = node.begin().value();
+    const std::string inside = where + "." + printable(kind);
+    for (const auto& [name, parse] : kNodes)
+        if (name == kind)
+            return parse(body, inside, parser);
+    std::vector<std::string_view> known;
+    for (const auto& [name, parse] : kNodes)
+        known.push_back(name);
+    for (int i = 0; i <= static_cast<int>(ShapeKind::boulder); ++i) {
+        const auto shape = static_cast<ShapeKind>(i);
+        if (shape_name(shape) == kind)
+            return parse_shape(shape, body, inside, parser);
+        known.push_back(shape_name(shape));
+    }
+    refuse(where, "unknown kind '" + printable(kind) + "'" + did_you_mean(kind, known));
+}
+
+} // namespace taihu

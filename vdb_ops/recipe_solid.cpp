@@ -1,0 +1,196 @@
+#include "vdb_ops/recipe_solid.h"
+
+#include <cmath>
+
+#include <nlohmann/json.hpp>
+
+#include "stats/core/error.h"
+#include "stats/core/text.h"
+#include "stats/io/json_detail.h"
+#include "stats/number_detail.h"
+#include "vdb_ops/rasterize.h"
+#include "vdb_ops/recipe_parse_detail.h"
+#include "vdb_ops/voxelize.h"
+
+namespace taihu {
+namespace {
+
+using nlohmann::json;
+using nlohmann::ordered_json;
+
+constexpr int kVersion = 1, kDefaultDim = 256;
+constexpr double kMostSeed = 1.8446744073709551e19;
+constexpr std::string_view kRequired[] = {"taihu_recipe", "solid"};
+constexpr std::string_view kOptional[] = {"seed", "voxel_m", "dim", "material",
+                                          "lod",  "about",   "set"};
+
+json read_recipe(const std::string& text, const std::string& where) {
+    json recipe = parse_json(text, where);
+    if (!recipe.is_object() || !recipe.contains("taihu_recipe"))
+        throw Error(Fault::bad_input,
+                    where + ": no recipe; a recipe is an object with 'taihu_recipe' and 'solid'");
+    if (recipe["taihu_recipe"] != kVersion)
+        throw Error(Fault::bad_input, where + ": 'taihu_recipe' is " +
+                                          printable(recipe["taihu_recipe"].dump()) +
+                                          ", this program reads 1; use a later taihu");
+    check_keys(recipe, where, kRequired, kOptional);
+    if (recipe.contains("voxel_m") && recipe.contains("dim"))
+        throw Error(Fault::bad_input, where + ": has 'voxel_m' and 'dim'; give one of them");
+    return recipe;
+}
+
+std::uint64_t seed_of(const json& recipe, const std::string& where,
+                      const RecipeSettings& settings) {
+    if (settings.seed)
+        return *settings.seed;
+    if (!recipe.contains("seed"))
+        return 0;
+    json_number(recipe, where, "seed", 0, kMostSeed);
+    if (!recipe["seed"].is_number_unsigned())
+        throw Error(Fault::bad_input, where + ": 'seed' must be a whole number");
+    return recipe["seed"].get<std::uint64_t>();
+}
+
+std::optional<RecipeLod> lod_of(const json& recipe, const std::string& where, double scale) {
+    if (!recipe.contains("lod"))
+        return std::nullopt;
+    static constexpr std::string_view kKeys[] = {"levels", "bound_m", "factor"};
+    const std::string inside = where + ": lod";
+    check_keys(recipe["lod"], inside, kKeys);
+    return RecipeLod{static_cast<int>(json_number(recipe["lod"], inside, "levels", 1, 8)),
+                     scale * json_number(recipe["lod"], inside, "bound_m", 1e-9, 1e6),
+                     json_number(recipe["lod"], inside, "factor", 1.01, 100)};
+}
+
+/// The box of the solid before it is scaled.
+Box solid_box(const RecipeNode& root, const std::string& where) {
+    const Box box = root.box({});
+    if (!is_finite(box.lo) || !is_finite(box.hi))
+        throw Error(Fault::bad_input,
+                    where + ": solid: has no bounds; intersect it with something that has");
+    if (box.empty() || !(box.volume() > 0))
+        throw Error(Fault::bad_input,
+                    where + ": solid: is empty; its parts do not meet, or are holes alone");
+    return box;
+}
+
+double voxel_of(const json& recipe, const std::string& where, const RecipeSettings& settings,
+                const Box& box, double scale) {
+    if (settings.voxel_m)
+        return *settings.voxel_m;
+    if (settings.dim)
+        return voxel_for(box, *settings.dim);
+    if (recipe.contains("voxel_m")) // 0: of a mesh that needed none
+        if (const double v = json_number(recipe, where, "voxel_m", 0, 1e6); v > 0)
+            return v * scale;
+    if (recipe.contains("dim"))
+        return voxel_for(box, static_cast<int>(json_number(recipe, where, "dim", 4, 65536)));
+    return voxel_for(box, kDefaultDim);
+}
+
+double area_m2(const Box& box) {
+    const Vec3 s = box.size();
+    return 2 * (s.x * s.y + s.y * s.z + s.z * s.x);
+}
+
+/// What makes the solid again: the recipe with the settings in it, keys as they stood.
+std::string settled(const std::string& text, const RecipeSolid& made, std::uint64_t seed,
+                    double scale) {
+    const ordered_json given = ordered_json::parse(text);
+    ordered_json solid = given["solid"];
+    if (scale != 1) {
+        ordered_json node = {{"transform", {{"of", std::move(solid)}, {"scale", scale}}}};
+        solid = std::move(node);
+    }
+    ordered_json out =
+        ordered_json::parse(format_recipe(solid.dump(), made.voxel_m, seed, made.lod));
+    if (given.contains("material")) {
+        ordered_json whole;
+        for (const auto& [key, value] : out.items()) {
+            if (key == "solid")
+                whole["material"] = given["material"];
+            whole[key] = value;
+        }
+        out = std::move(whole);
+    }
+    return out.dump();
+}
+
+} // namespace
+
+RecipeSolid make_recipe(const std::string& recipe, const std::string& where,
+                        const RecipeAssets& assets, const RecipeSettings& settings,
+                        Progress* progress) {
+    const json text = read_recipe(recipe, where);
+    if (settings.height_m && !(*settings.height_m > 0 && std::isfinite(*settings.height_m)))
+        throw Error(Fault::bad_argument,
+                    "height: " + shortest(*settings.height_m) + " m; must be > 0");
+    const std::uint64_t seed = seed_of(text, where, settings);
+    RecipeParser parser{assets, seed, nullptr, 0};
+    if (text.contains("material"))
+        parser.material = &text["material"];
+    report_stage(progress, "reading the recipe");
+    const auto root = parse_node(text["solid"], where + ": solid", parser);
+    const Box own = solid_box(*root, where);
+    const double scale = settings.height_m ? *settings.height_m / own.size().y : 1;
+    const Similarity at = Similarity::scaling(scale);
+    const Box box = placed(own, at);
+
+    RecipeSolid made;
+    if (!(settings.coarsen >= 1 && settings.coarsen <= 64))
+        throw Error(Fault::bad_argument,
+                    "coarsen: " + shortest(settings.coarsen) + "; must be in 1..64");
+    made.voxel_m = settings.coarsen * voxel_of(text, where, settings, box, scale);
+    made.lod = lod_of(text, where, scale);
+    refuse_if_too_large(area_m2(box), box, made.voxel_m);
+    Lattice lattice;
+    lattice.voxel_m = made.voxel_m;
+    if (const openvdb::FloatGrid* giver = root->lattice_giver()) {
+        const Lattice given = lattice_of(*giver);
+        if (std::fabs(given.voxel_m - made.voxel_m) <= 1e-9 * made.voxel_m)
+            lattice = given;
+    }
+    made.solid = root->grid({lattice, made.found, made.holes, progress}, at);
+    made.recipe = settled(recipe, made, seed, scale);
+    return made;
+}
+
+std::string with_setting(const std::string& recipe, const std::string& where,
+                         const std::string& key, const std::string& value) {
+    read_recipe(recipe, where);
+    ordered_json text = ordered_json::parse(recipe);
+    std::string path = key;
+    if (!key.starts_with('/')) {
+        const ordered_json names = text.value("set", ordered_json::object());
+        std::vector<std::string> known{"seed", "dim", "voxel_m"};
+        for (const auto& [name, to] : names.items())
+            if (to.is_string())
+                known.push_back(name);
+        const std::vector<std::string_view> views(known.begin(), known.end());
+        if (std::find(known.begin(), known.end(), key) == known.end())
+            throw Error(Fault::bad_argument, where + ": there is no setting '" + printable(key) +
+                                                 "'" + did_you_mean(key, views));
+        path = names.contains(key) ? names[key].get<std::string>() : "/" + key;
+    }
+    ordered_json parsed = ordered_json::parse(value, nullptr, false);
+    if (parsed.is_discarded())
+        parsed = value;
+    try {
+        const ordered_json::json_pointer pointer(path);
+        if (!text.contains(pointer) && path.find('/', 1) != std::string::npos)
+            throw Error(Fault::bad_argument,
+                        where + ": there is nothing at '" + printable(path) + "'; see the recipe");
+        if (path == "/dim")
+            text.erase("voxel_m");
+        if (path == "/voxel_m")
+            text.erase("dim");
+        text[pointer] = std::move(parsed);
+    } catch (const ordered_json::exception&) {
+        throw Error(Fault::bad_argument, where + ": '" + printable(path) +
+                                             "' is no path; write "
+                                             "it as /solid/sphere/size_m/0");
+    }
+    return text.dump();
+}
+
+} // namespace taihu
