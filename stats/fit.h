@@ -56,11 +56,11 @@ struct Fit {
 /// \throws Error bad_argument: the level, the resolution, the family; bad_input: as Detection,
 ///         fewer than 8 profiles, all of them at the detection limit (no spread to fit), profiles
 ///         outside of 1e-9..1e9; numeric: no maximum.
-/// Cost: about 300 passes over the sample, of two parameters 2000. Fewer than 20 profiles are
+/// Cost: 100 to 200 passes over the sample, of two parameters 2200. Fewer than 20 profiles are
 /// noted, as are a law at the edge of what is tried and intervals without an end.
 Fit fit_law(const Sample& sample, Family family, const FitSettings& settings = {});
 
-/// The law of fit_law alone, without intervals, densities and notes: some 20 times cheaper, for
+/// The law of fit_law alone, without intervals, densities and notes: some 10 times cheaper, for
 /// resampling.
 /// \throws Error as fit_law.
 Law likeliest_law(const Sample& sample, Family family, const FitSettings& settings = {});

@@ -1,8 +1,7 @@
 // The simulation table of the estimators: how far each is from a truth that is drawn, beside what
-// it is held to. Deterministic but for the times; about two minutes on two processors. Not a test:
+// it is held to. Deterministic; about two minutes on two processors. Not a test:
 // the tests run a small share of it.
 #include <array>
-#include <chrono>
 #include <cmath>
 #include <functional>
 #include <optional>
@@ -10,7 +9,6 @@
 #include <string>
 #include <vector>
 
-#include "stats/bootstrap.h"
 #include "stats/core/error.h"
 #include "stats/fit.h"
 #include "stats/sampler.h"
@@ -238,24 +236,6 @@ void unfoldings() {
             }
 }
 
-double seconds(const std::function<void()>& work) {
-    const auto start = std::chrono::steady_clock::now();
-    work();
-    return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
-}
-
-void times(Bars& bars) {
-    const Sample three_hundred = draw(kExponential.law, 0, 300, 0).sample;
-    const Sample fifty = draw(kExponential.law, 0, 50, 0).sample;
-    const std::array at = {0.5, 1.0, 2.0};
-    fmt::print("\n300 profiles, five laws with intervals [s]: {}\n",
-               bars.at_most(seconds([&] { fit_laws(three_hundred); }), 0.1));
-    for (const Family family : {Family::exponential, Family::lognormal})
-        fmt::print(
-            "50 profiles, band of 1000 resamples, {} [s]: {}\n", family_name(family),
-            bars.at_most(seconds([&] { f3_band(fifty, likeliest_law(fifty, family), at); }), 10));
-}
-
 } // namespace
 } // namespace taihu
 
@@ -265,7 +245,6 @@ int main() {
         taihu::known_family(bars);
         taihu::unknown_family(bars);
         taihu::unfoldings();
-        taihu::times(bars);
         bars.print_sum();
         return 0;
     } catch (const std::exception& e) {
