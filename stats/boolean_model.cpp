@@ -3,6 +3,8 @@
 #include <cmath>
 #include <numbers>
 
+#include <boost/math/special_functions/lambert_w.hpp>
+
 #include "stats/core/error.h"
 #include "stats/number_detail.h"
 
@@ -49,6 +51,16 @@ double overlap_corrected_n_a(double n_a_seen, double a_a) {
                                              " profiles per area with a share " + shortest(a_a) +
                                              " of holes; must be >= 0 and in 0..1, below 1");
     return n_a_seen / (1 - a_a);
+}
+
+std::optional<double> overlap_corrected_n_v(const Law& law, double n_v_seen) {
+    if (!(n_v_seen >= 0 && std::isfinite(n_v_seen)))
+        throw Error(Fault::bad_argument, "overlap correction: n_v is " + shortest(n_v_seen) +
+                                             "; must be finite and >= 0");
+    const double v = MeanBall(law).v, seen = n_v_seen * v;
+    if (seen * std::numbers::e >= 1)
+        return std::nullopt;
+    return -boost::math::lambert_w0(-seen) / v;
 }
 
 std::optional<double> sponge_porosity(const Law& law) {

@@ -30,6 +30,12 @@ BooleanModel boolean_model(const Law& law, double n_v);
 /// \throws Error bad_argument.
 double overlap_corrected_n_a(double n_a_seen, double a_a);
 
+/// Hole centres per volume, when only the profiles whose lowest point shows were marked: the n with
+/// n exp(-n v) = n_v_seen, v the mean volume of a ball. Nothing when there is none: no density
+/// shows so many. \param n_v_seen  as if no profile were hidden in others [1 / unit^3], >= 0.
+/// \throws Error bad_argument.
+std::optional<double> overlap_corrected_n_v(const Law& law, double n_v_seen);
+
 /// The porosity at which chi_v of the union falls to 0: more tunnels than holes from there on, the
 /// rock is a sponge. 31 % for equal balls, whatever their size. Nothing for laws so broad that it
 /// never happens: small holes, that stay alone, outweigh all tunnels.

@@ -346,4 +346,32 @@ double Law::moment(int k) const {
     return result;
 }
 
+Law scaled(const Law& law, double factor) {
+    if (!(factor > 0 && std::isfinite(factor)))
+        refuse(law.family(), "scaled by " + shortest(factor), "give a finite factor > 0");
+    if (law.family() == Family::empirical) {
+        std::vector<CdfPoint> points(law.points().begin(), law.points().end());
+        for (CdfPoint& p : points)
+            p.diameter *= factor;
+        return Law::empirical(std::move(points));
+    }
+    std::vector<double> p(law.parameters().begin(), law.parameters().end());
+    switch (law.family()) {
+    case Family::exponential:
+        p[0] /= factor;
+        break;
+    case Family::gamma:
+    case Family::weibull:
+        p[1] *= factor;
+        break;
+    case Family::lognormal:
+        p[0] += std::log(factor);
+        break;
+    default: // every parameter is a length
+        for (double& length : p)
+            length *= factor;
+    }
+    return Law(law.family(), p);
+}
+
 } // namespace taihu

@@ -80,4 +80,8 @@ private:
     std::vector<CdfPoint> points_;
 };
 
+/// The law of factor * D: the same diameters in a unit that is `factor` times smaller.
+/// \throws Error bad_argument: factor not finite and > 0, or a parameter that leaves its range.
+Law scaled(const Law& law, double factor);
+
 } // namespace taihu

@@ -178,7 +178,8 @@ ClusterCenters::ClusterCenters(const Box& box, const ClusterSettings& settings, 
     parents_box_ = box.dilated((thomas ? kNormalReach : 1) * settings.spread_m);
     const double mean = settings.parents_m3 * parents_box_.volume();
     if (!(mean <= kMost))
-        refuse(shortest(mean) + " clusters; at most 1e8 are drawn, use a smaller parents_m3");
+        refuse(shortest(mean) +
+               " clusters; at most 1e8 are drawn, use fewer per m^3 or a smaller spread");
     n_parents_ = poisson_count(mean, {seed, kParentCountStream});
 }
 
@@ -188,8 +189,8 @@ double ClusterCenters::mean_count(double density_m3) const {
 
 Vec3 ClusterCenters::center(std::uint64_t i) const {
     if (n_parents_ == 0)
-        throw Error(Fault::numeric, "centres: no cluster fell into the box; use a larger "
-                                    "parents_m3, or another seed");
+        throw Error(Fault::numeric, "centres: no cluster fell into the box; use more per "
+                                    "m^3, or another seed");
     const Rng rng{seed(), kCenterStream}, parents{seed(), kParentStream};
     Draws draws{rng, i};
     const auto pick = static_cast<std::uint64_t>(draws.next() * static_cast<double>(n_parents_));
@@ -257,30 +258,10 @@ Vec3 JointCenters::center(std::uint64_t i) const {
                                 "too small to hit; move them inwards");
 }
 
-ThinnedCenters::ThinnedCenters(std::shared_ptr<const CenterStream> centers,
-                               std::function<double(const Vec3&)> share)
-    : CenterStream(centers->box(), centers->seed()), centers_(std::move(centers)),
-      share_(std::move(share)) {}
-
-double ThinnedCenters::mean_count(double density_m3) const {
-    return centers_->mean_count(density_m3);
-}
-
-Vec3 ThinnedCenters::center(std::uint64_t i) const {
-    const Rng rng{seed(), kThinStream};
-    for (std::uint64_t n = 0; n < kTries; ++n) {
-        const std::uint64_t item = attempt(i, n);
-        const Vec3 p = centers_->center(item);
-        const double share = share_(p);
-        if (!(share >= 0 && share <= 1))
-            refuse("the share kept at (" + shortest(p.x) + ", " + shortest(p.y) + ", " +
-                   shortest(p.z) + ") is " + shortest(share) + "; must be in 0..1");
-        // The candidate's own coin: whoever meets the same candidate again decides the same.
-        if (rng.uniform(item) < share)
-            return p;
-    }
-    throw Error(Fault::numeric, "centres: none of 10^5 was kept; raise the share to 1 where holes "
-                                "are densest");
+bool center_stays(std::uint64_t i, double share, std::uint64_t seed) {
+    if (!(share >= 0 && share <= 1))
+        refuse("the share that stays is " + shortest(share) + "; must be in 0..1");
+    return share == 1 || Rng{seed, kThinStream}.uniform(i) < share;
 }
 
 std::vector<Vec3> lattice_centers(const Box& box, double spacing_m) {
@@ -290,7 +271,8 @@ std::vector<Vec3> lattice_centers(const Box& box, double spacing_m) {
     double n[3], all = 1;
     Vec3 first;
     for (int axis = 0; axis < 3; ++axis) {
-        n[axis] = std::max(1.0, std::floor(size[axis] / spacing_m));
+        // 0.3 m hold three steps of 0.1 m, whatever the last bit says.
+        n[axis] = std::max(1.0, std::floor(size[axis] / spacing_m * (1 + 1e-12)));
         all *= n[axis];
         first[axis] = box.center()[axis] - 0.5 * spacing_m * (n[axis] - 1);
     }
@@ -320,14 +302,16 @@ std::vector<Vec3> hard_core_centers(const CenterStream& candidates, std::span<co
     report_stage(progress, "placing holes apart");
     BallGrid grid(candidates.box(), sum / static_cast<double>(radii_m.size()));
     std::vector<Vec3> centers;
+    std::uint64_t n_tries = 0;
     for (std::size_t i = 0; i < radii_m.size(); ++i) {
-        if (i % 1000 == 0)
-            check_cancelled(progress);
         for (std::uint64_t n = 0;; ++n) {
+            if (n_tries++ % 1000 == 0)
+                check_cancelled(progress);
             if (n == kTries)
-                throw Error(Fault::numeric, "centres: ball " + std::to_string(i + 1) + " of " +
-                                                std::to_string(radii_m.size()) +
-                                                " finds no room; use fewer or smaller holes");
+                throw Error(Fault::numeric,
+                            "centres: ball " + std::to_string(i + 1) + " of " +
+                                std::to_string(radii_m.size()) +
+                                " finds no room; use fewer or smaller holes, or a smaller gap");
             const Sphere ball{candidates.center(attempt(i, n)), radii_m[i] + 0.5 * gap_m};
             if (grid.touches(ball))
                 continue;
@@ -343,7 +327,7 @@ std::vector<double> hole_radii(const Law& law, double scale_m, std::uint64_t see
     const HoleStream stream(law, Box{{0, 0, 0}, {1, 1, 1}}, scale_m, seed);
     std::vector<double> radii(n);
     for (std::size_t i = 0; i < n; ++i)
-        radii[i] = stream.hole(i).radius_m;
+        radii[i] = stream.radius_m(i);
     return radii;
 }
 

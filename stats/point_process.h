@@ -1,7 +1,5 @@
 #pragma once
 #include <cstdint>
-#include <functional>
-#include <memory>
 #include <span>
 #include <vector>
 
@@ -93,21 +91,10 @@ private:
     double reach_m_, sd_m_;
 };
 
-/// Centres of another stream, thinned: each is kept with a chance that depends on where it lies,
-/// as on its height. The density asked for is the mean over the box after thinning.
-class ThinnedCenters final : public CenterStream {
-public:
-    /// \param share  0..1 everywhere; called from the threads that ask for centres.
-    ThinnedCenters(std::shared_ptr<const CenterStream> centers,
-                   std::function<double(const Vec3&)> share);
-    /// \throws Error bad_argument: a share outside of 0..1; numeric: 10^5 centres were not kept.
-    Vec3 center(std::uint64_t i) const override;
-    double mean_count(double density_m3) const override;
-
-private:
-    std::shared_ptr<const CenterStream> centers_;
-    std::function<double(const Vec3&)> share_;
-};
+/// Density that depends on the place, as on the height: whether the i-th of a list of centres stays
+/// where only this share of them does. The same coin for the same i and seed.
+/// \param share  0..1. \throws Error bad_argument: another share.
+bool center_stays(std::uint64_t i, double share, std::uint64_t seed);
 
 /// The nodes of a cubic lattice of this spacing that fit into the box, in its middle.
 /// \throws Error bad_argument: the box, the spacing, or more than 1e8 nodes.
@@ -120,7 +107,7 @@ std::vector<Vec3> lattice_centers(const Box& box, double spacing_m);
 /// largest come first.
 /// \param radii_m  each > 0; \param gap_m  >= 0.
 /// \throws Error bad_argument: radii_m[i] or gap_m; numeric: a ball finds no room in 10^5 tries;
-///         cancelled: within 1000 balls.
+///         cancelled: within 1000 tries.
 /// Cost: a few grid cells for each try.
 std::vector<Vec3> hard_core_centers(const CenterStream& candidates, std::span<const double> radii_m,
                                     double gap_m, Progress* progress = nullptr);

@@ -24,7 +24,11 @@ Sphere HoleStream::hole(std::uint64_t i) const {
     const Vec3 center{box_.lo.x + rng_.uniform(i, 0) * size.x,
                       box_.lo.y + rng_.uniform(i, 1) * size.y,
                       box_.lo.z + rng_.uniform(i, 2) * size.z};
-    return {center, 0.5 * scale_m_ * law_.quantile(rng_.uniform(i, 3))};
+    return {center, radius_m(i)};
+}
+
+double HoleStream::radius_m(std::uint64_t i) const {
+    return 0.5 * scale_m_ * law_.quantile(rng_.uniform(i, 3));
 }
 
 std::uint64_t poisson_count(double mean, const Rng& rng) {

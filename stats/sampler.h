@@ -24,6 +24,7 @@ public:
     HoleStream(Law law, const Box& box, double scale_m, std::uint64_t seed);
 
     Sphere hole(std::uint64_t i) const;
+    double radius_m(std::uint64_t i) const; ///< of that hole
 
 private:
     Law law_;

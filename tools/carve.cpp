@@ -30,10 +30,10 @@ LawHoles read_or_place(const CarveArgs& args, const Solid& base, const Console& 
                          [&](const Law& law, const Placement& p) {
                              return place_holes(law, p, *base.grid, console.progress);
                          });
-    if (args.placement.any())
-        throw Error(Fault::bad_argument,
-                    args.holes.string() + ": a table says where its holes are; --scale, --count, "
-                                          "--porosity, --density and --seed are for a law.json");
+    if (const auto option = args.placement.any())
+        throw Error(Fault::bad_argument, args.holes.string() +
+                                             ": a table says where its holes are; drop " + *option +
+                                             ", it is for a law.json");
     LawHoles holes;
     holes.placed.holes = read_holes(args.holes);
     holes.node = holes_node(base_name(args.holes), sha256_hex(read_file(args.holes)));
@@ -84,7 +84,7 @@ void tell(const CarveArgs& args, const LawHoles& holes, const CarveResult& carve
 
 void run(const CarveArgs& args, const Console& console) {
     check_solid_path(args.out);
-    console.may_write(args.out, {args.base.path, args.holes});
+    console.may_write(args.out, {args.base.path, args.holes, args.placement.where});
     args.surface.check(args.out);
     const CleanSettings cleaning = clean_settings(args);
     const Solid base = read_solid(args.base, console);
@@ -124,6 +124,8 @@ void add_carve(CLI::App& app, Console& console) {
         app, "carve", "Subtract holes from a base: a table of them, or a law placed in it",
         "  taihu carve base.vdb --holes holes.csv -o rock.vdb\n"
         "  taihu carve bunny.obj --holes law.json --scale 25% --porosity 0.25 --dim 256 -o "
+        "rock.glb\n"
+        "  taihu carve base.vdb --holes law.json --scale 20% --porosity 0.2 --pattern joints -o "
         "rock.glb\n"
         "  taihu carve base.vdb --holes holes.csv --pieces all -o rock.ply --json");
     verb->add_option("base", args->base.path, "Solid to carve (.vdb, or a mesh to voxelize)")

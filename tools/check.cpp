@@ -8,8 +8,6 @@
 namespace taihu {
 namespace {
 
-constexpr int kSaysNo = 3;
-
 MeshFile content(const SolidOptions& options, const Console& console) {
     if (!is_vdb(options.path))
         return read_mesh(options.path, options.mesh_settings(), console.progress);

@@ -73,6 +73,9 @@ struct Console {
                    std::initializer_list<std::filesystem::path> others = {}) const;
 };
 
+/// Exit code of a verb whose answer is no.
+inline constexpr int kSaysNo = 3;
+
 /// The signal that asked to stop, or 0.
 int stop_signal();
 /// Let SIGINT and SIGTERM cancel instead of kill.

@@ -13,13 +13,21 @@ namespace taihu {
 
 /// The words by which verbs place a law in a solid.
 struct PlacementOptions {
+    bool empirical = false;
     std::string scale;
     std::optional<std::uint64_t> count;
     std::optional<double> porosity, density;
-    std::optional<std::uint64_t> seed; ///< 0 when not given
+    std::optional<std::uint64_t> seed;  ///< 0 when not given
+    std::optional<std::string> pattern; ///< uniform when not given
+    std::optional<double> clusters;
+    std::optional<int> joints;
+    std::string spread, scatter, gap, spacing; ///< lengths, or empty
+    std::string height;
+    std::filesystem::path where;
 
     void add_options(CLI::App& verb);
-    bool any() const { return !scale.empty() || count || porosity || density || seed; }
+    /// The name of one that was given, or nothing.
+    std::optional<std::string> any() const;
 };
 
 /// A law placed: the holes, what a recipe says of them, and which figures were chosen.

@@ -40,7 +40,7 @@ LawHoles sample(const SampleArgs& args, const Console& console) {
 void run(const SampleArgs& args, const Console& console) {
     if (args.out.extension() != ".csv")
         throw Error(Fault::unsupported, args.out.string() + ": holes are a table; name a .csv");
-    console.may_write(args.out, {args.law, args.solid.path});
+    console.may_write(args.out, {args.law, args.solid.path, args.placement.where});
     const LawHoles holes = sample(args, console);
     write_file(args.out, format_holes(holes.placed.holes, holes.comments));
     nlohmann::ordered_json json = {{"file", args.out.string()},
@@ -60,7 +60,9 @@ void add_sample(CLI::App& app, Console& console) {
     auto* verb = console.verb(
         app, "sample", "Draw holes from a law, inside a solid or a box",
         "  taihu sample law.json --in base.vdb --scale 25% --porosity 0.3 -o holes.csv\n"
-        "  taihu sample law.json --box 1,1,2 --scale 10cm --count 500 --seed 3 -o holes.csv");
+        "  taihu sample law.json --box 1,1,2 --scale 10cm --count 500 --seed 3 -o holes.csv\n"
+        "  taihu sample law.json --box 1 --scale 10cm --count 500 --pattern thomas --height 0.2:1 "
+        "-o holes.csv");
     verb->add_option("law", args->law, "Law of diameters (law.json)")->required();
     verb->add_option("-o,--output", args->out, "Table to write: x_m,y_m,z_m,radius_m (.csv)")
         ->required();

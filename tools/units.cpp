@@ -48,6 +48,16 @@ double length_m(const std::string& option, const std::string& text, const Measur
     return in_metres(option, parse_length(option, text), of);
 }
 
+double angle_deg(const std::string& option, const std::string& text) {
+    std::string_view number = text;
+    if (number.ends_with("deg"))
+        number.remove_suffix(3);
+    if (const auto value = parse_number(number))
+        return *value;
+    throw Error(Fault::bad_argument,
+                option + ": '" + printable(text) + "' is no angle; write 25deg");
+}
+
 Vec3 parse_size(const std::string& option, const std::string& text) {
     std::vector<double> parts;
     for (std::size_t at = 0; at <= text.size();) {

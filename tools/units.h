@@ -28,6 +28,10 @@ double in_metres(const std::string& option, const Length& length, const Measure&
 /// parse_length and in_metres in one.
 double length_m(const std::string& option, const std::string& text, const Measure& of = {});
 
+/// An angle as people type it [deg]: `25deg`, or `25`.
+/// \throws Error bad_argument: no number, another unit.
+double angle_deg(const std::string& option, const std::string& text);
+
 /// `X`, or `X,Y,Z`, of lengths in metres; one number stands for all three.
 Vec3 parse_size(const std::string& option, const std::string& text);
 

@@ -1,15 +1,15 @@
 #include "vdb_ops/place.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <numbers>
 #include <string>
-
-#include <openvdb/tools/Interpolation.h>
+#include <utility>
 
 #include "stats/core/error.h"
-#include "stats/sampler.h"
-#include "vdb_ops/analytic_field.h"
-#include "vdb_ops/rasterize.h"
+#include "stats/number_detail.h"
+#include "vdb_ops/hole_source_detail.h"
 
 namespace taihu {
 namespace {
@@ -17,118 +17,36 @@ namespace {
 constexpr double kTolerance = 0.005; // of the porosity, absolute
 constexpr double kTail = 1e-7;       // share of diameters that the margin round a solid leaves out
 constexpr double kMaxSamples = 4e6;  // points at which porosity is counted
-constexpr std::uint64_t kMaxHoles = 100'000'000;
 constexpr std::uint64_t kMaxStreams = 64; // tried for one porosity
 constexpr std::uint32_t kAnotherStream = 0x73747265;
-
-/// Where holes go: a box that holds it, whether a point lies inside, whether a ball meets it.
-class Region {
-public:
-    virtual ~Region() = default;
-    virtual Box box() const = 0;
-    virtual bool inside(const Vec3& p) const = 0;
-    virtual bool meets(const Sphere& ball) const = 0;
-};
-
-class BoxRegion final : public Region {
-public:
-    explicit BoxRegion(const Box& box) : box_(box) {}
-    Box box() const override { return box_; }
-    bool inside(const Vec3& p) const override { return box_.contains(p); }
-    bool meets(const Sphere& ball) const override {
-        return box_distance(ball.center - box_.center(), box_.size() * 0.5) < ball.radius_m;
-    }
-
-private:
-    Box box_;
-};
-
-class SolidRegion final : public Region {
-public:
-    explicit SolidRegion(const openvdb::FloatGrid& grid)
-        : lattice_(lattice_of(grid)), accessor_(grid.getConstAccessor()) {
-        openvdb::CoordBBox box;
-        if (!grid.tree().evalLeafBoundingBox(box))
-            throw Error(Fault::bad_argument, "holes: the solid is empty; give one that is not");
-        box_.include(world(box.min()));
-        box_.include(world(box.max()));
-    }
-    Box box() const override { return box_; }
-    bool inside(const Vec3& p) const override {
-        const Vec3 i = (p - lattice_.origin) / lattice_.voxel_m;
-        return openvdb::tools::BoxSampler::sample(accessor_, openvdb::Vec3d(i.x, i.y, i.z)) < 0;
-    }
-    bool meets(const Sphere& ball) const override {
-        const Vec3 c = (ball.center - lattice_.origin) / lattice_.voxel_m;
-        const double r = ball.radius_m / lattice_.voxel_m;
-        const float d =
-            openvdb::tools::BoxSampler::sample(accessor_, openvdb::Vec3d(c.x, c.y, c.z));
-        if (d < 0.999f * lattice_.half_width_vox * static_cast<float>(lattice_.voxel_m))
-            return d < ball.radius_m; // in the band, or inside
-        return any_solid_leaf(c, r);
-    }
-
-private:
-    Vec3 world(const openvdb::Coord& c) const {
-        return lattice_.origin +
-               Vec3{double(c.x()), double(c.y()), double(c.z())} * lattice_.voxel_m;
-    }
-
-    /// Beyond the band: look for solid voxels in the leaves that the ball meets.
-    bool any_solid_leaf(const Vec3& c, double r) const {
-        openvdb::Coord lo, hi;
-        for (int axis = 0; axis < 3; ++axis) {
-            const double first = (box_.lo[axis] - lattice_.origin[axis]) / lattice_.voxel_m;
-            const double last = (box_.hi[axis] - lattice_.origin[axis]) / lattice_.voxel_m;
-            if (c[axis] + r < first || c[axis] - r > last)
-                return false;
-            lo[axis] = static_cast<int>(std::floor(std::max(c[axis] - r, first))) & ~7;
-            hi[axis] = static_cast<int>(std::ceil(std::min(c[axis] + r, last)));
-        }
-        for (int x = lo.x(); x <= hi.x(); x += 8)
-            for (int y = lo.y(); y <= hi.y(); y += 8)
-                for (int z = lo.z(); z <= hi.z(); z += 8)
-                    if (leaf_meets(openvdb::Coord(x, y, z), c, r))
-                        return true;
-        return false;
-    }
-
-    bool leaf_meets(const openvdb::Coord& origin, const Vec3& c, double r) const {
-        const Vec3 middle{origin.x() + 3.5, origin.y() + 3.5, origin.z() + 3.5};
-        if (box_distance(c - middle, {3.5, 3.5, 3.5}) >= r)
-            return false;
-        const auto* leaf = accessor_.probeConstLeaf(origin);
-        if (!leaf)
-            return accessor_.getValue(origin) < 0;
-        for (openvdb::Index v = 0; v < 512; ++v) {
-            const openvdb::Coord p = leaf->offsetToGlobalCoord(v);
-            // The surface lies a part of a voxel beyond a solid voxel: its own distance.
-            if (const float d = leaf->getValue(v);
-                d < 0 && length(Vec3{double(p.x()), double(p.y()), double(p.z())} - c) +
-                                 d / lattice_.voxel_m <
-                             r)
-                return true;
-        }
-        return false;
-    }
-
-    Lattice lattice_;
-    mutable openvdb::FloatGrid::ConstAccessor accessor_; // a cache: one thread
-    Box box_;
-};
+constexpr int kMaxJoints = 1000;
+constexpr std::uint64_t kCentersPerHole = 100'000; // fewer come through: the search is given up
 
 [[noreturn]] void refuse(const std::string& what) {
     throw Error(Fault::bad_argument, "holes: " + what);
 }
 
-void check_placement(const Placement& p) {
+template <class Kind>
+bool is(const Pattern& pattern) {
+    return std::holds_alternative<Kind>(pattern);
+}
+
+/// Nothing but the law decides where holes are.
+bool plain(const Placement& p) {
+    return is<UniformPattern>(p.pattern) && !p.height && !p.where;
+}
+
+void check_number(const Placement& p) {
     const int given = p.count.has_value() + p.porosity.has_value() + p.density_m3.has_value();
+    if (is<LatticePattern>(p.pattern)) {
+        if (given > 0)
+            refuse(
+                "a lattice has as many as its spacing fits in; drop count, porosity and density");
+        return;
+    }
     if (given != 1)
         refuse(std::to_string(given) +
                " of count, porosity and density are given; give exactly one");
-    if (!(p.scale_m > 0) || !std::isfinite(p.scale_m))
-        refuse("scale is " + std::to_string(p.scale_m) +
-               " m, must be finite and > 0; give a length");
     if (p.count && (*p.count < 1 || *p.count > kMaxHoles))
         refuse("count is " + std::to_string(*p.count) + ", must be 1..1e8; ask for fewer");
     if (p.porosity && !(*p.porosity >= 0 && *p.porosity <= 0.95))
@@ -137,42 +55,90 @@ void check_placement(const Placement& p) {
         refuse("density is " + std::to_string(*p.density_m3) + " per m^3, must be finite and > 0");
 }
 
+void check_where(const openvdb::FloatGrid& grid) {
+    if (!grid.transform().isLinear())
+        refuse("the volume 'where' is a frustum; resample it to cubic voxels");
+    if (grid.getGridClass() == openvdb::GRID_LEVEL_SET)
+        return;
+    for (auto v = grid.cbeginValueAll(); v; ++v)
+        if (!(*v >= 0 && *v <= 1))
+            refuse("the volume 'where' is " + shortest(double{*v}) +
+                   " somewhere, must be 0..1; scale it, or give a level set");
+}
+
+void check_placement(const Placement& p) {
+    check_number(p);
+    if (!(p.scale_m > 0) || !std::isfinite(p.scale_m))
+        refuse("scale is " + std::to_string(p.scale_m) +
+               " m, must be finite and > 0; give a length");
+    if (const auto* joints = std::get_if<JointsPattern>(&p.pattern);
+        joints && (joints->n < 1 || joints->n > kMaxJoints))
+        refuse(std::to_string(joints->n) + " joints, must be 1..1000; ask for fewer");
+    if (p.height) {
+        const auto [bottom, top] = *p.height;
+        if (!(bottom >= 0 && bottom <= 1 && top >= 0 && top <= 1 && bottom + top > 0))
+            refuse("the share is " + shortest(bottom) + " at the bottom and " + shortest(top) +
+                   " at the top, both must be 0..1 and one > 0");
+    }
+    if (p.where)
+        check_where(*p.where);
+}
+
 /// The box that centres of a stationary process are drawn in: all but kTail of the holes that meet
 /// the region have theirs there.
-Box stationary_box(const Law& law, const Placement& placement, const Region& region) {
+Box stationary_box(const Law& law, const Placement& placement, const HoleRegion& region) {
     return region.box().dilated(0.5 * placement.scale_m * law.quantile(1 - kTail));
 }
 
-PlacedHoles place_count(const Law& law, const Placement& placement, const Region& region,
-                        Progress* progress) {
-    const HoleStream stream(law, region.box(), placement.scale_m, placement.seed);
-    PlacedHoles placed;
-    for (std::uint64_t i = 0; placed.holes.size() < *placement.count; ++i) {
-        if (i % 65536 == 0)
-            check_cancelled(progress);
-        if (i > 1000 && placed.holes.size() < i / 100'000)
-            throw Error(Fault::numeric, "holes: the solid fills less than 1e-5 of its box; use a "
-                                        "smaller voxel, or give the holes as a table");
-        if (const Sphere hole = stream.hole(i); region.inside(hole.center))
-            placed.holes.push_back(hole);
-    }
-    return placed;
+[[noreturn]] void refuse_thin(const Placement& p) {
+    throw Error(Fault::numeric,
+                plain(p) ? "holes: the solid fills less than 1e-5 of its box; use a "
+                           "smaller voxel, or give the holes as a table"
+                         : "holes: the solid, the pattern and the shares of height and place let "
+                           "fewer than 1 in 1e5 centres through; widen one of them");
 }
 
-PlacedHoles place_density(const Law& law, const Placement& placement, const Region& region,
+PlacedHoles place_count(const Law& law, const Placement& p, const HoleRegion& region,
+                        Progress* progress) {
+    HoleSource source(law, p, region, region.box(), p.seed);
+    const Thinning thinning(p, region);
+    const auto wanted = static_cast<double>(*p.count);
+    source.lay_out(wanted, progress);
+    while (true) {
+        PlacedHoles placed;
+        for (std::uint64_t i = 0; i < source.size(); ++i) {
+            if (i % 65536 == 0)
+                check_cancelled(progress);
+            if (placed.holes.size() < i / kCentersPerHole)
+                refuse_thin(p);
+            const Sphere hole = source.hole(i);
+            if (!region.inside(hole.center) || !thinning.keeps(i, hole.center))
+                continue;
+            placed.holes.push_back(hole);
+            if (placed.holes.size() == *p.count)
+                return placed;
+        }
+        source.lay_out_more(static_cast<double>(placed.holes.size()), wanted, progress);
+    }
+}
+
+PlacedHoles place_density(const Law& law, const Placement& p, const HoleRegion& region,
                           Progress* progress) {
-    const Box box = stationary_box(law, placement, region);
-    const double mean = *placement.density_m3 * box.volume();
+    HoleSource source(law, p, region, stationary_box(law, p, region), p.seed);
+    const Thinning thinning(p, region);
+    const double mean = source.mean_count(*p.density_m3);
     if (mean > static_cast<double>(kMaxHoles))
         refuse("the density asks for " + std::to_string(mean) +
                " holes, at most 1e8 are placed; use a larger scale or a smaller solid");
-    const HoleStream stream(law, box, placement.scale_m, placement.seed);
-    const std::uint64_t n = poisson_count(mean, {placement.seed, kCountStream});
+    const std::uint64_t n = poisson_count(mean, {p.seed, kCountStream});
+    source.lay_out(static_cast<double>(n), progress);
     PlacedHoles placed;
     for (std::uint64_t i = 0; i < n; ++i) {
         if (i % 65536 == 0)
             check_cancelled(progress);
-        const Sphere hole = stream.hole(i);
+        const Sphere hole = source.hole(i);
+        if (!thinning.keeps(i, hole.center))
+            continue;
         if (region.meets(hole))
             placed.holes.push_back(hole);
         else
@@ -181,10 +147,23 @@ PlacedHoles place_density(const Law& law, const Placement& placement, const Regi
     return placed;
 }
 
+/// A lattice is filled: its number follows from its spacing.
+PlacedHoles place_lattice(const Law& law, const Placement& p, const HoleRegion& region) {
+    const HoleStream diameters(law, region.box(), p.scale_m, p.seed);
+    const Thinning thinning(p, region);
+    PlacedHoles placed;
+    const auto nodes =
+        lattice_centers(region.tight(), std::get<LatticePattern>(p.pattern).spacing_m);
+    for (std::size_t i = 0; i < nodes.size(); ++i)
+        if (region.inside(nodes[i]) && thinning.keeps(i, nodes[i]))
+            placed.holes.push_back({nodes[i], diameters.radius_m(i)});
+    return placed;
+}
+
 /// Points of a lattice that lie inside the region, taken away as holes come.
 class PorositySamples {
 public:
-    explicit PorositySamples(const Region& region) : box_(region.box()) {
+    explicit PorositySamples(const HoleRegion& region) : box_(region.box()) {
         const Vec3 size = box_.size();
         step_ = std::cbrt(size.x * size.y * size.z / kMaxSamples);
         for (int axis = 0; axis < 3; ++axis)
@@ -241,19 +220,64 @@ private:
     std::size_t n_all_ = 0, n_left_ = 0;
 };
 
-/// The prefix of one stream whose porosity is nearest to the target; `next` is that of one hole
-/// more or fewer, on the other side of it.
-PlacedHoles place_prefix(const HoleStream& stream, double target, const Region& region,
-                         PorositySamples samples, double& next, Progress* progress) {
+/// Notices when holes go where there are holes already, or nowhere: patterns and shares may leave
+/// no more to take, and the search would go on to 1e8 of them.
+class Stall {
+public:
+    explicit Stall(const Placement& p) : p_(p) {}
+    void check(std::uint64_t n_tried, std::size_t n, double porosity) {
+        if (plain(p_))
+            return;
+        if (n < n_tried / kCentersPerHole)
+            refuse_thin(p_);
+        if (n < next_)
+            return;
+        // Once the gain falls, each doubling of their number takes away less than the one before.
+        const double gain = porosity - before_;
+        const double n_doublings = (*p_.porosity - porosity) / gain;
+        const double n_needed = static_cast<double>(n_tried) * std::exp2(n_doublings);
+        if (gain / porosity < 0.2 && n_needed > kMaxHoles)
+            throw Error(Fault::numeric, "holes: " + std::to_string(n) +
+                                            " of them reach a porosity of " +
+                                            std::to_string(porosity) +
+                                            " only, and more take hardly more away; widen the "
+                                            "pattern or the shares, or ask for less");
+        before_ = porosity;
+        next_ *= 2;
+    }
+
+private:
+    const Placement& p_;
+    std::size_t next_ = 4096;
+    double before_ = 0;
+};
+
+/// The first holes of a stream whose porosity is nearest to a target.
+struct Prefix {
     PlacedHoles placed;
-    double before = 0, now = 0;
+    double porosity = 0;
+    double other = 0;    ///< of one hole more or fewer, on the other side of the target
+    bool enough = false; ///< a hard core may have been laid out with too few
+};
+
+Prefix place_prefix(const HoleSource& source, const Placement& p, const HoleRegion& region,
+                    const Thinning& thinning, PorositySamples samples, Progress* progress) {
+    const double target = *p.porosity;
+    Prefix prefix;
+    auto& [placed, now, before, enough] = prefix;
+    Stall stall(p);
     for (std::uint64_t i = 0; now < target; ++i) {
+        if (i == source.size())
+            return prefix;
         if (i % 4096 == 0)
             check_cancelled(progress);
         if (i >= kMaxHoles)
             throw Error(Fault::numeric, "holes: 1e8 of them reach a porosity of " +
                                             std::to_string(now) + " only; use a larger scale");
-        const Sphere hole = stream.hole(i);
+        stall.check(i, placed.holes.size(), now);
+        const Sphere hole = source.hole(i);
+        if (!thinning.keeps(i, hole.center))
+            continue;
         if (!region.meets(hole)) {
             ++placed.n_missed;
             continue;
@@ -263,66 +287,83 @@ PlacedHoles place_prefix(const HoleStream& stream, double target, const Region& 
         now = samples.porosity();
         placed.holes.push_back(hole);
     }
-    next = before;
+    enough = true;
     if (!placed.holes.empty() && target - before < now - target) {
         placed.holes.pop_back();
-        std::swap(next, now);
+        std::swap(before, now);
     }
     placed.porosity = now;
-    return placed;
+    return prefix;
 }
 
-PlacedHoles place_porosity(const Law& law, const Placement& placement, const Region& region,
+/// Balls that take away this share of a box when none of them overlap.
+double balls_for(double porosity, const Box& box, const Law& law, double scale_m) {
+    const double mean_m3 = std::numbers::pi / 6 * scale_m * scale_m * scale_m * law.moment(3);
+    return std::ceil(1.05 * porosity * box.volume() / mean_m3) + 16;
+}
+
+PlacedHoles place_porosity(const Law& law, const Placement& p, const HoleRegion& region,
                            Progress* progress) {
-    const double target = *placement.porosity;
+    const double target = *p.porosity;
     const PorositySamples samples(region);
-    const Box box = stationary_box(law, placement, region);
+    const Thinning thinning(p, region);
+    const Box box = stationary_box(law, p, region);
     // One large hole may step over the target: then another stream of the same seed is tried.
-    PlacedHoles placed;
-    double next = 0;
+    Prefix prefix;
     for (std::uint64_t stream = 0; stream < kMaxStreams; ++stream) {
-        const auto w = Rng{placement.seed, kAnotherStream}.words(stream);
-        const std::uint64_t seed = stream == 0 ? placement.seed : std::uint64_t{w[0]} << 32 | w[1];
-        placed = place_prefix(HoleStream(law, box, placement.scale_m, seed), target, region,
-                              samples, next, progress);
-        if (std::fabs(*placed.porosity - target) <= kTolerance)
-            return placed;
+        const auto w = Rng{p.seed, kAnotherStream}.words(stream);
+        const std::uint64_t seed = stream == 0 ? p.seed : std::uint64_t{w[0]} << 32 | w[1];
+        HoleSource source(law, p, region, box, seed);
+        source.lay_out(balls_for(target, box, law, p.scale_m), progress);
+        while (!(prefix = place_prefix(source, p, region, thinning, samples, progress)).enough)
+            source.lay_out_more(prefix.porosity, target, progress);
+        if (std::fabs(prefix.porosity - target) <= kTolerance)
+            return prefix.placed;
     }
+    const auto [lo, hi] = std::minmax(prefix.porosity, prefix.other);
     throw Error(Fault::numeric, "holes: porosity " + std::to_string(target) + " lies between " +
-                                    std::to_string(std::min(*placed.porosity, next)) + " and " +
-                                    std::to_string(std::max(*placed.porosity, next)) +
+                                    std::to_string(lo) + " and " + std::to_string(hi) +
                                     ", one hole apart; use a smaller scale");
 }
 
-PlacedHoles place(const Law& law, const Placement& placement, const Region& region,
+PlacedHoles place(const Law& law, const Placement& p, const HoleRegion& region,
                   Progress* progress) {
-    check_placement(placement);
     report_stage(progress, "placing holes");
-    if (placement.count)
-        return place_count(law, placement, region, progress);
-    if (placement.density_m3)
-        return place_density(law, placement, region, progress);
-    return place_porosity(law, placement, region, progress);
+    if (is<LatticePattern>(p.pattern))
+        return place_lattice(law, p, region);
+    if (p.count)
+        return place_count(law, p, region, progress);
+    if (p.density_m3)
+        return place_density(law, p, region, progress);
+    return place_porosity(law, p, region, progress);
 }
 
 } // namespace
 
+std::string_view pattern_name(const Pattern& pattern) {
+    static constexpr std::array<std::string_view, 5> kNames = {"uniform", "thomas", "joints",
+                                                               "hard-core", "lattice"};
+    const auto* clusters = std::get_if<ClusterSettings>(&pattern);
+    return clusters && clusters->shape == ClusterSettings::Shape::matern ? "matern"
+                                                                         : kNames[pattern.index()];
+}
+
 PlacedHoles place_holes(const Law& law, const Placement& placement, const openvdb::FloatGrid& solid,
                         Progress* progress) {
-    return place(law, placement, SolidRegion(solid), progress);
+    check_placement(placement);
+    return place(law, placement, *hole_region(solid), progress);
 }
 
 PlacedHoles place_holes(const Law& law, const Placement& placement, const Box& box,
                         Progress* progress) {
-    if (box.empty() || !(box.volume() > 0) || !is_finite(box.lo) || !is_finite(box.hi))
-        throw Error(Fault::bad_argument, "holes: the box has no volume; give three lengths > 0");
-    return place(law, placement, BoxRegion(box), progress);
+    check_placement(placement);
+    return place(law, placement, *hole_region(box), progress);
 }
 
 std::size_t count_missing(std::span<const Sphere> holes, const openvdb::FloatGrid& solid) {
-    const SolidRegion region(solid);
+    const auto region = hole_region(solid);
     return static_cast<std::size_t>(std::count_if(
-        holes.begin(), holes.end(), [&](const Sphere& hole) { return !region.meets(hole); }));
+        holes.begin(), holes.end(), [&](const Sphere& hole) { return !region->meets(hole); }));
 }
 
 } // namespace taihu

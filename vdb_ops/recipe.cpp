@@ -26,6 +26,21 @@ Json lod_json(const RecipeLod& lod) {
     return {{"levels", lod.n_levels}, {"bound_m", lod.bound_m}, {"factor", lod.factor}};
 }
 
+/// Null for holes anywhere.
+Json pattern_json(const Pattern& pattern) {
+    Json json;
+    if (const auto* clusters = std::get_if<ClusterSettings>(&pattern))
+        json[std::string(pattern_name(pattern))] = {{"clusters_m3", clusters->parents_m3},
+                                                    {"spread_m", clusters->spread_m}};
+    else if (const auto* joints = std::get_if<JointsPattern>(&pattern))
+        json["joints"] = {{"n", joints->n}, {"scatter_m", joints->scatter_m}};
+    else if (const auto* apart = std::get_if<HardCorePattern>(&pattern))
+        json["hard_core"] = {{"gap_m", apart->gap_m}};
+    else if (const auto* lattice = std::get_if<LatticePattern>(&pattern))
+        json["lattice"] = {{"spacing_m", lattice->spacing_m}};
+    return json;
+}
+
 /// A recipe's text as JSON; null when it is not one. It may come from any file: depth and size are
 /// limited.
 Json recipe_json(const std::string& recipe) {
@@ -75,8 +90,10 @@ std::string holes_node(const std::string& name, const std::string& sha256) {
 }
 
 std::string holes_node(const std::string& name, const std::string& sha256,
-                       const Placement& placement) {
+                       const Placement& placement, const HoleSources& sources) {
     Json body = {{"law", name}, {"sha256", sha256}};
+    if (sources.empirical)
+        body["empirical"] = true;
     if (placement.count)
         body["count"] = *placement.count;
     if (placement.porosity)
@@ -85,6 +102,12 @@ std::string holes_node(const std::string& name, const std::string& sha256,
         body["density_m3"] = *placement.density_m3;
     body["scale_m"] = placement.scale_m;
     body["seed"] = placement.seed;
+    if (Json pattern = pattern_json(placement.pattern); !pattern.is_null())
+        body["pattern"] = std::move(pattern);
+    if (placement.height)
+        body["height"] = {placement.height->bottom, placement.height->top};
+    if (sources.where)
+        body["where"] = {{"file", sources.where->name}, {"sha256", sources.where->sha256}};
     return node("holes", std::move(body));
 }
 

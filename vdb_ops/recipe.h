@@ -3,6 +3,7 @@
 #include <optional>
 #include <string>
 
+#include "stats/io/measurements.h"
 #include "vdb_ops/place.h"
 #include "vdb_ops/shapes.h"
 
@@ -20,9 +21,14 @@ std::string mesh_node(const std::string& name, const std::string& sha256, double
 std::string level_set_node(const std::string& name, const std::string& sha256);
 /// Holes from a table.
 std::string holes_node(const std::string& name, const std::string& sha256);
-/// Holes from a law file.
+/// What the files say that holes of a law come from, beside the law itself.
+struct HoleSources {
+    bool empirical = false;          ///< diameters from the law file's table instead of its family
+    std::optional<SourceFile> where; ///< that of Placement::where
+};
+/// Holes from a law file. What is by default has no key.
 std::string holes_node(const std::string& name, const std::string& sha256,
-                       const Placement& placement);
+                       const Placement& placement, const HoleSources& sources = {});
 std::string difference_node(const std::string& of, const std::string& minus);
 /// \param n_pieces  absent: all.
 std::string clean_node(const std::string& of, std::optional<std::size_t> n_pieces,

@@ -4,15 +4,13 @@
 #include <cmath>
 #include <numbers>
 
-#include <openvdb/tools/Interpolation.h>
 #include <tbb/blocked_range.h>
 #include <tbb/parallel_for.h>
 
-#include "stats/core/box.h"
 #include "stats/core/error.h"
 #include "stats/core/rng.h"
 #include "stats/number_detail.h"
-#include "vdb_ops/rasterize.h"
+#include "vdb_ops/plane_image_detail.h"
 
 namespace taihu {
 namespace {
@@ -24,44 +22,6 @@ constexpr std::uint32_t kTries = 1000;
 
 [[noreturn]] void refuse(const std::string& what) {
     throw Error(Fault::bad_argument, "section: " + what);
-}
-
-/// A level set for one thread.
-class Sampler {
-public:
-    explicit Sampler(const openvdb::FloatGrid& grid)
-        : lattice_(lattice_of(grid)), accessor_(grid.getConstAccessor()) {}
-    bool solid(const Vec3& p) const {
-        const Vec3 i = (p - lattice_.origin) / lattice_.voxel_m;
-        return openvdb::tools::BoxSampler::sample(accessor_, openvdb::Vec3d(i.x, i.y, i.z)) < 0;
-    }
-
-private:
-    Lattice lattice_;
-    openvdb::FloatGrid::ConstAccessor accessor_;
-};
-
-/// The box of the inside of a level set, a voxel larger.
-Box solid_box(const openvdb::FloatGrid& grid) {
-    const Lattice lattice = lattice_of(grid);
-    openvdb::CoordBBox voxels;
-    for (auto leaf = grid.tree().cbeginLeaf(); leaf; ++leaf)
-        for (auto v = leaf->cbeginValueOn(); v; ++v)
-            if (*v < 0)
-                voxels.expand(v.getCoord());
-    if (voxels.empty())
-        refuse("grid '" + grid.getName() + "' is empty; give a solid that is not");
-    Box box;
-    for (const openvdb::Coord& c : {voxels.min(), voxels.max()})
-        box.include(lattice.origin +
-                    Vec3{double(c.x()), double(c.y()), double(c.z())} * lattice.voxel_m);
-    return box.dilated(lattice.voxel_m);
-}
-
-/// Half the extent of a box along a direction of length 1.
-double support(const Box& box, const Vec3& n) {
-    const Vec3 half = box.size() * 0.5;
-    return half.x * std::abs(n.x) + half.y * std::abs(n.y) + half.z * std::abs(n.z);
 }
 
 SectionPlane plane_at(const Box& box, const Vec3& normal, double offset) {
@@ -89,44 +49,6 @@ SectionPlane random_plane(const Box& box, const Rng& rng, std::uint64_t item, st
     return plane_at(box, normalized(d), offset);
 }
 
-/// What a plane shows: a lattice of pixels.
-struct PlaneImage {
-    enum Kind : std::uint8_t { air, solid, hole };
-    double u_lo = 0, v_lo = 0, step = 0; ///< pixel (i, j) lies at u_lo + i * step, v_lo + j * step
-    int nu = 0, nv = 0;
-    std::vector<std::uint8_t> kind; ///< i fastest
-
-    std::size_t at(int i, int j) const {
-        return static_cast<std::size_t>(j) * static_cast<std::size_t>(nu) +
-               static_cast<std::size_t>(i);
-    }
-    /// The pixels of one kind that hang together with `first`, which become `to`.
-    std::vector<std::size_t> take_region(std::size_t first, std::uint8_t to) {
-        const std::uint8_t from = kind[first];
-        std::vector<std::size_t> region = {first};
-        kind[first] = to;
-        const auto width = static_cast<std::size_t>(nu);
-        const auto visit = [&](std::size_t p) {
-            if (kind[p] == from) {
-                kind[p] = to;
-                region.push_back(p);
-            }
-        };
-        for (std::size_t k = 0; k < region.size(); ++k) {
-            const std::size_t p = region[k];
-            if (p % width > 0)
-                visit(p - 1);
-            if (p % width + 1 < width)
-                visit(p + 1);
-            if (p >= width)
-                visit(p - width);
-            if (p + width < kind.size())
-                visit(p + width);
-        }
-        return region;
-    }
-};
-
 /// Everything that the planes share.
 struct Cut {
     const openvdb::FloatGrid& solid;
@@ -144,7 +66,7 @@ struct Cut {
 
 PlaneImage Cut::image(const SectionPlane& plane, std::uint64_t item, std::uint32_t draw) const {
     PlaneImage image;
-    image.step = step;
+    image.step_u = image.step_v = step;
     const double u_half = support(box, plane.u), v_half = support(box, plane.v);
     const Vec3 middle = box.center() - plane.origin;
     // A frame of air all round, and a random lattice.
@@ -152,75 +74,41 @@ PlaneImage Cut::image(const SectionPlane& plane, std::uint64_t item, std::uint32
     image.v_lo = dot(middle, plane.v) - v_half - (1 + lattice.uniform(item, 2 * draw + 1)) * step;
     image.nu = static_cast<int>(2 * u_half / step) + 4;
     image.nv = static_cast<int>(2 * v_half / step) + 4;
-    image.kind.resize(static_cast<std::size_t>(image.nu) * static_cast<std::size_t>(image.nv));
-    const Sampler rock(solid), whole(known.base ? *known.base : solid);
-    for (int j = 0; j < image.nv; ++j)
-        for (int i = 0; i < image.nu; ++i) {
-            const Vec3 p = plane.origin + plane.u * (image.u_lo + i * step) +
-                           plane.v * (image.v_lo + j * step);
-            const bool inside = !known.base || whole.solid(p);
-            image.kind[image.at(i, j)] = !inside         ? PlaneImage::air
-                                         : rock.solid(p) ? PlaneImage::solid
-                                                         : PlaneImage::hole;
-        }
-    if (!known.base) // void that reaches the frame is the air round the outline
-        image.take_region(0, PlaneImage::air);
+    image.sample(plane, solid, known.base);
     return image;
 }
 
 void Cut::circles(const PlaneImage& image, const SectionPlane& plane,
                   std::vector<Profile>& profiles) const {
     for (const Sphere& hole : *known.holes) {
-        const Vec3 c = hole.center - plane.origin;
-        const double height = dot(c, plane.normal);
-        if (!(std::abs(height) < hole.radius_m))
-            continue;
-        const double u = dot(c, plane.u), v = dot(c, plane.v);
-        const double i = std::round((u - image.u_lo) / step),
-                     j = std::round((v - image.v_lo) / step);
-        if (!(i >= 0 && j >= 0 && i < image.nu && j < image.nv) ||
-            image.kind[image.at(static_cast<int>(i), static_cast<int>(j))] == PlaneImage::air)
-            continue;
-        const double d = 2 * std::sqrt((hole.radius_m - height) * (hole.radius_m + height));
-        profiles.push_back({0, u, v, d, d, false});
+        const Circle c = circle_of(hole, plane);
+        if (c.radius > 0 && image.kind_near(c.u, c.v) != PlaneImage::air)
+            profiles.push_back({0, c.u, c.v, 2 * c.radius, 2 * c.radius, false});
     }
 }
 
 /// Returns how many were too small.
 std::uint64_t Cut::regions(PlaneImage& image, std::vector<Profile>& profiles) const {
-    constexpr std::uint8_t kDone = 3;
     std::uint64_t n_small = 0;
     const auto width = static_cast<std::size_t>(image.nu);
     for (std::size_t first = 0; first < image.kind.size(); ++first) {
         if (image.kind[first] != PlaneImage::hole)
             continue;
-        const std::vector<std::size_t> region = image.take_region(first, kDone);
-        const auto n = static_cast<double>(region.size());
+        const std::vector<std::size_t> region = image.take_region(first, PlaneImage::taken);
         Profile profile;
-        profile.diameter_m = 2 * step * std::sqrt(n / std::numbers::pi);
+        profile.diameter_m =
+            2 * step * std::sqrt(static_cast<double>(region.size()) / std::numbers::pi);
         if (profile.diameter_m < smallest_m) {
             ++n_small;
             continue;
         }
-        double x = 0, y = 0, xx = 0, xy = 0, yy = 0;
-        for (const std::size_t p : region) {
-            x += static_cast<double>(p % width) / n;
-            y += static_cast<double>(p / width) / n;
+        for (const std::size_t p : region)
             for (const std::size_t q : {p - 1, p + 1, p - width, p + width})
                 profile.clipped |= image.kind[q] == PlaneImage::air;
-        }
-        for (const std::size_t p : region) {
-            const double dx = static_cast<double>(p % width) - x;
-            const double dy = static_cast<double>(p / width) - y;
-            xx += dx * dx / n;
-            xy += dx * dy / n;
-            yy += dy * dy / n;
-        }
-        // A quarter of the squared semi-axis; the spread of a pixel itself, 1/12, belongs to it.
-        const double variance = 0.5 * (xx + yy) + std::hypot(0.5 * (xx - yy), xy) + 1.0 / 12;
-        profile.major_m = 4 * step * std::sqrt(variance);
-        profile.u_m = image.u_lo + x * step;
-        profile.v_m = image.v_lo + y * step;
+        const RegionEllipse ellipse = ellipse_of(image, region);
+        profile.major_m = ellipse.major * step;
+        profile.u_m = image.u_lo + ellipse.x * step;
+        profile.v_m = image.v_lo + ellipse.y * step;
         profiles.push_back(profile);
     }
     return n_small;
@@ -281,7 +169,7 @@ Section section(const openvdb::FloatGrid& solid, const SectionKnown& known,
     if (const auto& d = settings.direction; d && (!is_finite(*d) || !(length(*d) > 0)))
         refuse("the direction is not finite or 0; give a vector that points somewhere");
     const double voxel_m = lattice_of(solid).voxel_m;
-    const Box box = solid_box(known.base ? *known.base : solid);
+    const Box box = solid_box(known.base ? *known.base : solid, "section");
     const double step = std::max(0.5 * voxel_m, box.longest() / kMostSamples);
     const double smallest = known.holes ? 0 : 4 * step;
     const Cut cut{solid, known, box, step, smallest, {settings.seed, kImageStream}};

@@ -65,9 +65,10 @@ private:
     using openvdb::io::Archive::write;
 };
 
-} // namespace
+enum class GridKind { level_set, any };
 
-VdbFile read_vdb(const std::filesystem::path& path) {
+/// The first float grid of this kind in a file; null when there is none.
+openvdb::FloatGrid::Ptr first_grid(const std::filesystem::path& path, GridKind kind) {
     const std::string where = path.string();
     openvdb::initialize();
     {
@@ -75,21 +76,29 @@ VdbFile read_vdb(const std::filesystem::path& path) {
         if (bytes.size() < sizeof kMagic || bytes.compare(0, 4, kMagic, 4) != 0)
             throw Error(Fault::bad_input, where + ": not an OpenVDB file; give a .vdb");
     }
-    VdbFile result;
+    openvdb::FloatGrid::Ptr found;
     try {
         openvdb::io::File file(path.string());
         file.open(false); // no delayed loading: the file may change under us
         const auto grids = file.readAllGridMetadata();
         for (const auto& grid : *grids)
-            if (!result.solid && grid && grid->isType<openvdb::FloatGrid>() &&
-                grid->getGridClass() == openvdb::GRID_LEVEL_SET)
-                result.solid =
-                    openvdb::gridPtrCast<openvdb::FloatGrid>(file.readGrid(grid->getName()));
+            if (!found && grid && grid->isType<openvdb::FloatGrid>() &&
+                (kind == GridKind::any || grid->getGridClass() == openvdb::GRID_LEVEL_SET))
+                found = openvdb::gridPtrCast<openvdb::FloatGrid>(file.readGrid(grid->getName()));
         file.close();
     } catch (const std::exception& e) {
         throw Error(Fault::bad_input, where + ": cannot be read as OpenVDB (" +
                                           printable(e.what(), 80) + "); write the file again");
     }
+    return found;
+}
+
+} // namespace
+
+VdbFile read_vdb(const std::filesystem::path& path) {
+    const std::string where = path.string();
+    VdbFile result;
+    result.solid = first_grid(path, GridKind::level_set);
     if (!result.solid)
         throw Error(Fault::bad_input,
                     where +
@@ -103,6 +112,16 @@ VdbFile read_vdb(const std::filesystem::path& path) {
     if (const auto recipe = result.solid->getMetadata<openvdb::StringMetadata>(kRecipeKey))
         result.recipe = recipe->value();
     return result;
+}
+
+openvdb::FloatGrid::Ptr read_volume(const std::filesystem::path& path) {
+    const std::string where = path.string();
+    const auto grid = first_grid(path, GridKind::any);
+    if (!grid)
+        throw Error(Fault::bad_input,
+                    where + ": holds no grid of floats; give a level set or a fog volume");
+    check_finite(*grid, where);
+    return grid;
 }
 
 void write_vdb(const std::filesystem::path& path, const openvdb::FloatGrid& solid,

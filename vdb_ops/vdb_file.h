@@ -17,6 +17,10 @@ struct VdbFile {
 ///   lattice_of(); io. OpenVDB's own messages are cut to one line.
 VdbFile read_vdb(const std::filesystem::path& path);
 
+/// The first grid of floats of a .vdb file, be it a level set or a fog volume.
+/// \throws Error bad_input: not a .vdb, damaged, no such grid, a non-finite voxel; io.
+openvdb::FloatGrid::Ptr read_volume(const std::filesystem::path& path);
+
 /// Write `solid` (named "surface") with `recipe` as the metadata taihu_recipe. The random id that
 /// OpenVDB writes into each file is replaced by one from the content: the same solid gives the same
 /// bytes. In one step, as write_file(). \throws Error io.

@@ -362,20 +362,37 @@ void join(const Part& part, bool first, Measurements& result) {
     sample.diameters.insert(sample.diameters.end(), part.diameters.begin(), part.diameters.end());
 }
 
-// E[minor / major] is how much the picture shortens the surface.
-void straighten_area(Measurements& result) {
-    if (!result.sample.area || result.segments.empty())
-        return;
+// How many times larger the surface is than its image, by E[minor / major] when all have a minor
+// axis.
+std::optional<double> stretch_of(const std::vector<Segment>& segments) {
     double ratios = 0;
-    for (const Segment& s : result.segments) {
+    for (const Segment& s : segments) {
         if (!s.minor_px)
-            return;
+            return std::nullopt;
         ratios += *s.minor_px / std::hypot(s.x2 - s.x1, s.y2 - s.y1);
     }
-    const double stretch = static_cast<double>(result.segments.size()) / ratios;
-    *result.sample.area *= stretch;
+    if (segments.empty())
+        return std::nullopt;
+    return static_cast<double>(segments.size()) / ratios;
+}
+
+void straighten_area(const std::optional<double>& area_factor, Measurements& result) {
+    std::optional<double> stretch = stretch_of(result.segments);
+    if (area_factor) {
+        if (stretch)
+            throw Error(Fault::bad_argument, "area factor: the segments have minor axes, which "
+                                             "say the slant already; leave it out");
+        if (result.sample.frames.empty())
+            throw Error(Fault::bad_argument,
+                        "area factor: it is for photos whose window is known, and these have "
+                        "none; give the area of the surface itself, or a mask");
+        stretch = area_factor;
+    }
+    if (!result.sample.area || !stretch)
+        return;
+    *result.sample.area *= *stretch;
     for (Frame& frame : result.sample.frames)
-        frame.area *= stretch;
+        frame.area *= *stretch;
 }
 
 // Lengths are final by now. A given area has no parts, so it makes no frames.
@@ -434,6 +451,10 @@ void check_settings(const MeasurementSettings& settings) {
     check("area", settings.area, false);
     check("detection limit", settings.detection_limit, true);
     check("scale bar", settings.scale_bar_m, false);
+    if (settings.area_factor && !(*settings.area_factor >= 1 && *settings.area_factor <= 100))
+        throw Error(Fault::bad_argument, "measurements: area factor is " +
+                                             shortest(*settings.area_factor) +
+                                             "; must be in 1..100, 1 / cos of the tilt");
     if (settings.scale_bar_m && settings.unit == LengthUnit::pixel)
         throw Error(Fault::bad_argument, "measurements: a scale bar gives metres but unit is px; "
                                          "drop one of them");
@@ -459,13 +480,14 @@ Measurements read_measurements(std::span<const std::filesystem::path> paths,
     if (settings.area)
         result.sample.area = settings.area;
     result.sample.detection_limit = settings.detection_limit;
+    result.sample.counting = settings.counting;
     const std::uint64_t n = n_profiles(result.sample);
     if (n < kFewestProfiles)
         throw Error(Fault::bad_input, result.sources.back().name + ": " + std::to_string(n) +
                                           " profiles; at least 8 are needed, mark more holes");
     scale_to_greatest(result);
     add_windows(masks, result);
-    straighten_area(result);
+    straighten_area(settings.area_factor, result);
     check_sample(result.sample);
     return result;
 }

@@ -23,6 +23,10 @@ struct MeasurementSettings {
     std::optional<double> unit_per_px; ///< of segments that have none of their own [unit / px], > 0
     std::optional<double> area;        ///< searched in all files together [unit^2], > 0
     std::optional<double> detection_limit; ///< nothing smaller was marked [unit], >= 0
+    /// Surface / its image: how much the photos shorten what was searched, 1..100; 1 / cos of the
+    /// angle between the surface and the picture. For areas that photos have by themselves.
+    std::optional<double> area_factor = std::nullopt;
+    Counting counting = Counting::centre; ///< which profiles were marked
     /// True length of the segments labelled `scale` [m], > 0: they give their photo its scale.
     std::optional<double> scale_bar_m = std::nullopt;
     /// Only segments with this label are holes; nothing given: all but those labelled `scale`.
@@ -99,7 +103,7 @@ struct Measurements {
 /// out. A given area is refused with segments whose unit is "greatest". Where every segment has its
 /// minor axis, the searched surface was seen at a slant: the area (no window) is divided by the
 /// mean of minor / major, which is what a picture shortens it by (a circle's image is an ellipse
-/// whose major axis keeps the diameter).
+/// whose major axis keeps the diameter). area_factor says the same where there are none.
 ///
 /// Warnings: what was left out, and how often; two segments with the same ends on one photo; a
 /// comment key that looks like a slip of `unit` or `area`; scale bars of one photo that differ;

@@ -46,6 +46,16 @@ TEST(BooleanModel, OverlapCorrectionTurnsSeenIntoAll) {
     EXPECT_NEAR(overlap_corrected_n_a(m.n_a_seen, m.a_a), m.n_a, 1e-14);
 }
 
+TEST(BooleanModel, HiddenProfilesAreAddedAgain) {
+    const Law law = Law::exponential(2);
+    for (const double n_v : {1e-6, 0.5, 2.0}) { // n_v v below 1: the root that is reached from 0
+        const double seen = n_v * (1 - boolean_model(law, n_v).a_a);
+        EXPECT_NEAR(*overlap_corrected_n_v(law, seen), n_v, 1e-12 * n_v); // rounding alone
+    }
+    EXPECT_EQ(*overlap_corrected_n_v(law, 0), 0);
+    EXPECT_FALSE(overlap_corrected_n_v(law, 1)); // n v exp(-n v) is 1 / e at most: 0.937 here
+}
+
 TEST(BooleanModel, EqualBallsMakeASpongeAt31Percent) {
     for (const double d : {0.01, 1.0, 30.0}) {
         const double porosity = *sponge_porosity(Law::constant(d));
@@ -61,6 +71,8 @@ TEST(BooleanModel, EqualBallsMakeASpongeAt31Percent) {
 TEST(BooleanModel, RefusesByName) {
     expect_error(Fault::bad_argument, "n_v is -1", [] { boolean_model(Law::exponential(1), -1); });
     expect_error(Fault::bad_argument, "a share 1 of holes", [] { overlap_corrected_n_a(3, 1); });
+    expect_error(Fault::bad_argument, "n_v is -2",
+                 [] { overlap_corrected_n_v(Law::exponential(1), -2); });
 }
 
 } // namespace

@@ -6,6 +6,7 @@
 
 #include <boost/math/special_functions/bessel.hpp>
 
+#include "stats/fit.h"
 #include "stats/section_draws.h"
 #include "tests/support/errors.h"
 
@@ -45,8 +46,15 @@ Law exponential_of(std::span<const double> diameters, double limit) {
     return Law::exponential(rate);
 }
 
-Refit exponential_refit(double limit = 0) {
-    return [limit](std::span<const double> d) { return exponential_of(d, limit); };
+Law exponential_refit(const Sample& sample) {
+    return exponential_of(sample.diameters, *sample.detection_limit);
+}
+
+Sample sample_of(std::vector<double> diameters, double limit = 0) {
+    Sample sample;
+    sample.diameters = std::move(diameters);
+    sample.detection_limit = limit;
+    return sample;
 }
 
 std::vector<double> profiles(const Law& law, std::size_t n, std::uint64_t seed, double limit = 0) {
@@ -58,7 +66,7 @@ std::vector<double> profiles(const Law& law, std::size_t n, std::uint64_t seed, 
 }
 
 Goodness rock_test(const std::vector<double>& d, std::uint64_t n_resamples) {
-    return goodness(d, 0, exponential_of(d, 0), exponential_refit(), n_resamples, 5);
+    return goodness(sample_of(d), exponential_of(d, 0), exponential_refit, {n_resamples, 5});
 }
 
 TEST(Goodness, StatisticsOfThreeProfilesAreThoseByHand) {
@@ -66,7 +74,7 @@ TEST(Goodness, StatisticsOfThreeProfilesAreThoseByHand) {
     std::vector<double> d;
     for (const double u : {0.5, 0.1, 0.8})
         d.push_back(std::sqrt(1 - (1 - u) * (1 - u)));
-    const GoodnessStatistics s = goodness_statistics(d, 0, Law::constant(1));
+    const GoodnessStatistics s = goodness_statistics(sample_of(d), Law::constant(1));
     EXPECT_NEAR(s.kolmogorov_smirnov, 1.0 / 3 - 0.1, 1e-12);
     EXPECT_NEAR(s.cramer_von_mises,
                 1.0 / 36 + std::pow(0.1 - 1.0 / 6, 2) + std::pow(0.8 - 5.0 / 6, 2), 1e-12);
@@ -95,7 +103,7 @@ TEST(Goodness, RejectsATrueLawAboutOnceInTwenty) {
     int ad = 0, ks = 0, cvm = 0, chi = 0;
     for (std::uint64_t run = 0; run < kRuns; ++run) {
         const auto d = profiles(Law::exponential(1), kRock, 1000 + run);
-        const GoodnessStatistics s = goodness_statistics(d, 0, exponential_of(d, 0));
+        const GoodnessStatistics s = goodness_statistics(sample_of(d), exponential_of(d, 0));
         ad += s.anderson_darling > g.anderson_darling.critical;
         ks += s.kolmogorov_smirnov > g.kolmogorov_smirnov.critical;
         cvm += s.cramer_von_mises > g.cramer_von_mises.critical;
@@ -116,7 +124,7 @@ TEST(Goodness, PValuesAreUniformUnderATrueLaw) {
     double mean = 0;
     for (std::uint64_t run = 0; run < kRuns; ++run) {
         const auto d = profiles(Law::exponential(1), 20, 5000 + run);
-        const double p = goodness(d, 0, exponential_of(d, 0), exponential_refit(), 39, run)
+        const double p = goodness(sample_of(d), exponential_of(d, 0), exponential_refit, {39, run})
                              .anderson_darling.p_value;
         n_small += p <= 0.05;
         mean += p / kRuns;
@@ -135,7 +143,7 @@ TEST(Goodness, TellsALognormalFromAnExponential) {
     int n_told = 0;
     for (std::uint64_t run = 0; run < kRuns; ++run) {
         const auto d = profiles(lognormal, kRock, run);
-        n_told += goodness_statistics(d, 0, exponential_of(d, 0)).anderson_darling >
+        n_told += goodness_statistics(sample_of(d), exponential_of(d, 0)).anderson_darling >
                   g.anderson_darling.critical;
     }
     EXPECT_GE(n_told, 0.6 * kRuns); // .69 by STEREOLOGY; the sd of 300 runs is .027
@@ -147,9 +155,9 @@ TEST(Goodness, ALimitIsPartOfTheTest) {
     for (std::uint64_t run = 0; run < 30; ++run) {
         const auto d = profiles(Law::exponential(1), 100, run, limit);
         const Law fitted = exponential_of(d, limit);
-        n_kept += goodness(d, limit, fitted, exponential_refit(limit), 59, run)
+        n_kept += goodness(sample_of(d, limit), fitted, exponential_refit, {59, run})
                       .anderson_darling.p_value <= 0.05;
-        n_ignored += goodness(d, 0, exponential_of(d, 0), exponential_refit(0), 59, run)
+        n_ignored += goodness(sample_of(d), exponential_of(d, 0), exponential_refit, {59, run})
                          .anderson_darling.p_value <= 0.05;
     }
     EXPECT_LE(n_kept, 5); // 1.5 expected, sd 1.2
@@ -159,7 +167,9 @@ TEST(Goodness, ALimitIsPartOfTheTest) {
 TEST(Goodness, LeavesOutTheProfileThatSetTheLimit) {
     auto d = profiles(Law::exponential(1), 60, 9);
     const double limit = *std::min_element(d.begin(), d.end());
-    const Goodness g = goodness(d, limit, exponential_of(d, limit), exponential_refit(limit), 99);
+    Sample sample = sample_of(d);
+    sample.detection_limit.reset(); // so the smallest one sets it
+    const Goodness g = goodness(sample, exponential_of(d, limit), exponential_refit, {99});
     EXPECT_EQ(g.n_profiles, 59u);
     EXPECT_EQ(g.n_at_limit, 1u);
     EXPECT_LT(g.anderson_darling.statistic, 10); // finite although F2 is 0 at the limit
@@ -167,20 +177,56 @@ TEST(Goodness, LeavesOutTheProfileThatSetTheLimit) {
 
 TEST(Goodness, AKnownLawIsNotRefitted) {
     const auto d = profiles(Law::exponential(1), 300, 4);
-    const Goodness good = goodness(d, 0, Law::exponential(1), {}, 199);
+    const Goodness good = goodness(sample_of(d), Law::exponential(1), {}, {199});
     EXPECT_GT(good.kolmogorov_smirnov.p_value, 0.05);
     // Kolmogorov's own critical value; sd of the quantile of 199 about 5 %.
     EXPECT_NEAR(good.kolmogorov_smirnov.critical, 1.36 / std::sqrt(300), 0.015);
-    const Goodness bad = goodness(d, 0, Law::exponential(1.4), {}, 199);
+    const Goodness bad = goodness(sample_of(d), Law::exponential(1.4), {}, {199});
     for (const GoodnessTest& test :
          {bad.anderson_darling, bad.kolmogorov_smirnov, bad.cramer_von_mises, bad.chi_squared})
         EXPECT_EQ(test.p_value, 1.0 / 200);
 }
 
+TEST(Goodness, StatisticsOfBinsAreThoseByHand) {
+    // Spheres of diameter 1: F2 = 1 - sqrt(1 - d^2) is .2 at .6 and .4 at .8.
+    Sample sample;
+    sample.bins = {{0, 0.6, 10}, {0.6, 0.8, 5}, {0.8, 1, 15}};
+    const GoodnessStatistics s = goodness_statistics(sample, Law::constant(1));
+    // Found 10, 15, 30 of 30; asked 6, 12, 30.
+    EXPECT_NEAR(s.kolmogorov_smirnov, 4.0 / 30, 1e-12);
+    EXPECT_NEAR(s.cramer_von_mises, (16 * 0.2 + 9 * 0.2) / 30, 1e-12);
+    EXPECT_NEAR(s.anderson_darling, (16 * 0.2 / 0.16 + 9 * 0.2 / 0.24) / 30, 1e-12);
+    EXPECT_NEAR(s.chi_squared, 16.0 / 6 + 1.0 / 6 + 9.0 / 18, 1e-12);
+}
+
+TEST(Goodness, KnowsBinsAndWindows) {
+    Sample binned;
+    binned.bins = {{0.1, 0.3, 40}, {0.3, 0.6, 3}, {0.6, 1, 30}, {1, 2, 2}}; // two humps
+    const Refit refit = [](const Sample& s) { return likeliest_law(s, Family::exponential); };
+    const Goodness humps = goodness(binned, refit(binned), refit, {99});
+    EXPECT_LE(humps.anderson_darling.p_value, 0.02);
+    EXPECT_LE(humps.chi_squared.p_value, 0.02);
+    // Through a small window few large profiles are seen whole: right with it, wrong without.
+    Sample framed = sample_of(profiles(Law::exponential(1), 4000, 6));
+    const Window window = Window::rectangle(6, 6);
+    std::size_t n = 0;
+    for (std::size_t i = 0; i < framed.diameters.size(); ++i) {
+        const double d = framed.diameters[i];
+        if (Rng{7, 3}.uniform(i) < window.eroded_area(d) / window.area())
+            framed.diameters[n++] = d;
+    }
+    framed.diameters.resize(std::min<std::size_t>(n, 600));
+    Sample without = framed;
+    framed.frames = {{36, {}, window}};
+    framed.counting = Counting::whole;
+    EXPECT_GT(goodness(framed, Law::exponential(1), {}, {199}).anderson_darling.p_value, 0.05);
+    EXPECT_LE(goodness(without, Law::exponential(1), {}, {199}).anderson_darling.p_value, 0.01);
+}
+
 TEST(Goodness, IsAFunctionOfItsSeed) {
     const auto d = profiles(Law::exponential(1), 30, 8);
     const auto p = [&](std::uint64_t seed) {
-        return goodness(d, 0, exponential_of(d, 0), exponential_refit(), 99, seed)
+        return goodness(sample_of(d), exponential_of(d, 0), exponential_refit, {99, seed})
             .anderson_darling.critical;
     };
     EXPECT_EQ(p(1), p(1));
@@ -190,16 +236,19 @@ TEST(Goodness, IsAFunctionOfItsSeed) {
 TEST(Goodness, RefusesByName) {
     const auto d = profiles(Law::exponential(1), 20, 8);
     const Law law = Law::exponential(1);
-    expect_error(Fault::bad_argument, "n_resamples is 5", [&] { goodness(d, 0, law, {}, 5); });
-    expect_error(Fault::bad_input, "7 profiles above the detection limit",
-                 [&] { goodness(std::span(d).first(7), 0, law, {}, 99); });
-    expect_error(Fault::bad_argument, "must be above the limit, 0.5",
-                 [] { goodness_statistics(std::vector{0.4}, 0.5, Law::exponential(1)); });
-    const Refit never = [](std::span<const double>) -> Law {
+    expect_error(Fault::bad_argument, "n_resamples is 5",
+                 [&] { goodness(sample_of(d), law, {}, {5}); });
+    expect_error(Fault::bad_input, "7 profiles above the detection limit", [&] {
+        goodness(sample_of({d.begin(), d.begin() + 7}), law, {}, {99});
+    });
+    expect_error(Fault::bad_argument, "a diameter is the detection limit, 0.5", [] {
+        goodness_statistics(sample_of({0.5, 0.6}, 0.5), Law::exponential(1));
+    });
+    const Refit never = [](const Sample&) -> Law {
         throw Error(Fault::numeric, "fit: no maximum");
     };
     expect_error(Fault::numeric, "because of 'fit: no maximum'",
-                 [&] { goodness(d, 0, law, never, 99); });
+                 [&] { goodness(sample_of(d), law, never, {99}); });
 }
 
 } // namespace

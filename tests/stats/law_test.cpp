@@ -74,6 +74,15 @@ TEST(Law, MomentsAreThoseOfItsQuantiles) {
                 << name(law) << " k " << k;
 }
 
+TEST(Law, ScaledIsTheSameLawInAnotherUnit) {
+    for (const Law& law : laws())
+        for (const double u : {0.1, 0.5, 0.97}) // rounding of the scaled parameters
+            EXPECT_NEAR(scaled(law, 25).quantile(u) / (25 * law.quantile(u)), 1, 1e-12)
+                << name(law);
+    EXPECT_EQ(scaled(Law::constant(2), 0.5), Law::constant(1));
+    EXPECT_THROW(scaled(Law::constant(2), 0), Error);
+}
+
 TEST(Law, HasTheMomentsOfTheTextbook) {
     EXPECT_DOUBLE_EQ(Law::exponential(4).mean(), 0.25);
     EXPECT_DOUBLE_EQ(Law::exponential(4).moment(3), 6.0 / 64);

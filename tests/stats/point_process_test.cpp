@@ -164,18 +164,22 @@ TEST(JointCenters, RandomPlanesPassTheBoxInAllDirections) {
     EXPECT_NEAR(y2, 1.0 / 3, 4 * 0.3 / std::sqrt(4000)); // sd of a squared cosine: 2 / sqrt(45)
 }
 
-TEST(ThinnedCenters, DensityByHeight) {
-    const auto share = [](const Vec3& p) { return 1 - p.y; };
-    const ThinnedCenters stream(std::make_shared<UniformCenters>(kUnit, 3), share);
+TEST(CenterStays, WithTheChanceOfItsShare) {
+    const UniformCenters stream(kUnit, 3);
     std::vector<double> u, x;
-    for (std::uint64_t i = 0; i < 10'000; ++i) {
+    for (std::uint64_t i = 0; i < 20'000; ++i) {
         const Vec3 p = stream.center(i);
-        u.push_back(p.y * (2 - p.y));
-        x.push_back(p.x);
+        EXPECT_TRUE(center_stays(i, 1, 3));
+        EXPECT_FALSE(center_stays(i, 0, 3));
+        if (center_stays(i, 1 - p.y, 3)) { // fewer and fewer upwards: the CDF of y is y (2 - y)
+            u.push_back(p.y * (2 - p.y));
+            x.push_back(p.x);
+        }
     }
-    EXPECT_LT(greatest_distance(u), 1.628 / 100); // Kolmogorov's critical value at 1 %
-    EXPECT_LT(greatest_distance(x), 1.628 / 100);
-    EXPECT_EQ(stream.mean_count(7), 7);
+    const auto n = static_cast<double>(u.size());
+    EXPECT_NEAR(n, 10'000, 4 * std::sqrt(5000));           // four standard deviations
+    EXPECT_LT(greatest_distance(u), 1.628 / std::sqrt(n)); // Kolmogorov's critical value at 1 %
+    EXPECT_LT(greatest_distance(x), 1.628 / std::sqrt(n));
 }
 
 TEST(HardCoreCenters, KeepTheirDistance) {
@@ -208,6 +212,7 @@ TEST(LatticeCenters, FillTheMiddleOfTheBox) {
     EXPECT_NEAR(centers.front().y, 0.15, 1e-15);
     EXPECT_NEAR(centers.front().z, 0.175, 1e-15);
     EXPECT_NEAR(centers.back().x, 0.9, 1e-15);
+    EXPECT_EQ(lattice_centers({{0, 0, 0}, {0.3, 0.3, 0.3}}, 0.1).size(), 27u); // 0.3 / 0.1 < 3
 }
 
 TEST(PointProcess, FromLatticeToClustersTheNearestComesNearer) {
@@ -263,18 +268,15 @@ TEST(PointProcess, RefusesByName) {
     expect_error(Fault::bad_argument, "planes[0] is not finite or has no direction", [] {
         JointCenters(kUnit, {{{0, 0.5, 0}, {0, 0, 0}}}, 0.1, 0);
     });
-    const auto base = std::make_shared<UniformCenters>(kUnit, 0);
-    expect_error(Fault::bad_argument, "is 2; must be in 0..1",
-                 [&] { ThinnedCenters(base, [](const Vec3&) { return 2.0; }).center(0); });
-    expect_error(Fault::numeric, "none of 10^5 was kept",
-                 [&] { ThinnedCenters(base, [](const Vec3&) { return 0.0; }).center(0); });
+    const UniformCenters base(kUnit, 0);
+    expect_error(Fault::bad_argument, "the share that stays is 2", [] { center_stays(0, 2, 0); });
     expect_error(Fault::bad_argument, "at most 1e8 are placed",
                  [] { lattice_centers(kUnit, 1e-4); });
     expect_error(Fault::bad_argument, "radii_m[1] is -1", [&] {
-        hard_core_centers(*base, std::vector{0.1, -1.0}, 0);
+        hard_core_centers(base, std::vector{0.1, -1.0}, 0);
     });
     expect_error(Fault::numeric, "finds no room; use fewer or smaller holes",
-                 [&] { hard_core_centers(*base, std::vector<double>(60, 0.25), 0); });
+                 [&] { hard_core_centers(base, std::vector<double>(60, 0.25), 0); });
 }
 
 } // namespace

@@ -30,5 +30,12 @@ TEST(Units, SizesAreOneLengthOrThree) {
         expect_error(Fault::bad_argument, "--size", [&] { parse_size("--size", bad); });
 }
 
+TEST(Units, AnglesAreInDegrees) {
+    EXPECT_DOUBLE_EQ(angle_deg("--tilt", "25deg"), 25);
+    EXPECT_DOUBLE_EQ(angle_deg("--tilt", "-2.5"), -2.5);
+    for (const char* bad : {"", "deg", "1rad", "1 deg", "nan"})
+        expect_error(Fault::bad_argument, "--tilt: '", [&] { angle_deg("--tilt", bad); });
+}
+
 } // namespace
 } // namespace taihu

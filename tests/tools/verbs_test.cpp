@@ -149,6 +149,31 @@ TEST(Verbs, HolesOfALawMayFollowItsOwnDensity) {
     EXPECT_THAT(read_file(scratch / "holes.csv"), HasSubstr("measured: the law's n_v"));
 }
 
+TEST(Verbs, MeasurePredictsWhatHolesAtRandomMake) {
+    const Scratch scratch;
+    write_file(scratch / "law.json",
+               R"({"taihu_law": 1, "family": "constant", "parameters": {"diameter": 1.2},
+                   "intervals": {}, "level": null, "unit": "greatest", "mean_diameter": 1.2,
+                   "n_v": null, "detection_limit": null, "n_profiles": 0, "area": null,
+                   "ranking": [], "source": []})");
+    result("taihu shape box --dim 100 -o base.vdb", scratch);
+    result("taihu carve base.vdb --holes law.json --scale 0.1m --density 300 --pieces all "
+           "--bubbles keep -o rock.vdb",
+           scratch);
+    const std::string command = "taihu measure rock.vdb --base base.vdb --law law.json ";
+    const json m = result(command + "--scale 0.1m --density 300", scratch);
+    const json& predicted = m["predicted"];
+    // Equal balls of 0.12 m: n v = 300 pi / 6 0.12^3, S_V = n pi 0.12^2 exp(-n v).
+    EXPECT_NEAR(predicted["porosity"].get<double>(), 0.2377, 1e-4);
+    EXPECT_NEAR(predicted["s_v_m1"].get<double>(), 10.346, 1e-3);
+    // One sample of about 300 holes: the sd is exp(-n v) v sqrt(300) = 0.012; three of them.
+    EXPECT_NEAR(m["porosity_base"].get<double>(), 0.2377, 0.036);
+    // The same 6 % of the number, and 2 % for the rims that a voxel of a twelfth cuts.
+    EXPECT_NEAR(m["s_v_base_m1"].get<double>(), 10.346, 0.12 * 10.346);
+    EXPECT_THAT(run(command + "--scale 0.1m", scratch.path()).err, HasSubstr("give --density"));
+    EXPECT_THAT(run(command + "--density 300", scratch.path()).err, HasSubstr("--scale 0.4m"));
+}
+
 TEST(Verbs, PiecesAndBubblesAreKeptOnRequest) {
     const Scratch scratch;
     result("taihu shape sphere --dim 64 -o ball.vdb", scratch);

@@ -20,6 +20,34 @@ TEST(Recipe, IsWrittenInOneOrderAndShortestNumbers) {
               R"("porosity":0.25,"scale_m":0.1,"seed":7}}]}},"pieces":1,"bubbles":"fill"}}})");
 }
 
+TEST(Recipe, HolesSayHowTheyLie) {
+    const auto node = [](const Pattern& pattern) {
+        Placement placement;
+        placement.pattern = pattern;
+        const std::string text = holes_node("law.json", "ab", placement);
+        return text.substr(text.find(R"("seed")"));
+    };
+    EXPECT_EQ(node(UniformPattern{}), R"("seed":0}})");
+    EXPECT_EQ(node(ClusterSettings{ClusterSettings::Shape::thomas, 20, 0.07}),
+              R"("seed":0,"pattern":{"thomas":{"clusters_m3":20.0,"spread_m":0.07}}}})");
+    EXPECT_EQ(node(ClusterSettings{ClusterSettings::Shape::matern, 20, 0.07}),
+              R"("seed":0,"pattern":{"matern":{"clusters_m3":20.0,"spread_m":0.07}}}})");
+    EXPECT_EQ(node(JointsPattern{4, 0.01}),
+              R"("seed":0,"pattern":{"joints":{"n":4,"scatter_m":0.01}}}})");
+    EXPECT_EQ(node(HardCorePattern{0.5}), R"("seed":0,"pattern":{"hard_core":{"gap_m":0.5}}}})");
+    EXPECT_EQ(node(LatticePattern{0.25}), R"("seed":0,"pattern":{"lattice":{"spacing_m":0.25}}}})");
+}
+
+TEST(Recipe, HolesSayWhatTheyAreMadeFrom) {
+    Placement placement;
+    placement.count = 3;
+    placement.height = {0.25, 1};
+    EXPECT_EQ(holes_node("law.json", "ab", placement, {true, SourceFile{"fog.vdb", "cd"}}),
+              R"({"holes":{"law":"law.json","sha256":"ab","empirical":true,"count":3,)"
+              R"("scale_m":1.0,"seed":0,"height":[0.25,1.0],)"
+              R"("where":{"file":"fog.vdb","sha256":"cd"}}})");
+}
+
 TEST(Recipe, ASolidCanBeBuiltOn) {
     const std::string ball = shape_node({.kind = ShapeKind::sphere});
     const std::string recipe = format_recipe(ball, 0.01, 0);

@@ -52,6 +52,23 @@ TEST(VdbFile, RefusesWhatIsNoLevelSet) {
     fog.close();
     expect_error(Fault::bad_input, "holds no float level set",
                  [&] { read_vdb(scratch / "fog.vdb"); });
+    EXPECT_EQ(read_volume(scratch / "fog.vdb")->tree().getValue(openvdb::Coord(0)), 1);
+    EXPECT_EQ(grid_hash(*read_volume(scratch / "rock.vdb")), grid_hash(*ball_rock()));
+}
+
+TEST(VdbFile, AVolumeIsAGridOfFloats) {
+    const Scratch scratch;
+    openvdb::io::File file(scratch / "mask.vdb");
+    file.write({openvdb::BoolGrid::create(false)});
+    file.close();
+    expect_error(Fault::bad_input, "mask.vdb: holds no grid of floats",
+                 [&] { read_volume(scratch / "mask.vdb"); });
+    const auto grid = openvdb::FloatGrid::create(0);
+    grid->tree().setValue(openvdb::Coord(0), std::nanf(""));
+    openvdb::io::File fog(scratch / "nan.vdb");
+    fog.write({grid});
+    fog.close();
+    expect_error(Fault::bad_input, "not finite", [&] { read_volume(scratch / "nan.vdb"); });
 }
 
 TEST(VdbFile, RefusesNonFiniteVoxels) {
