@@ -92,8 +92,9 @@ void tell_ranking(const LawRanking& ranking, const std::string& per, const Conso
     if (ranking.fits.size() > 1)
         console.say("weights of the laws (Akaike): {}", line);
     if (ranking.fits.size() > 1 && ranking.n_v)
-        console.say("holes per {}^3 by all of them: {:.4g}, standard deviation {:.4g}", per,
-                    ranking.n_v->mean, ranking.n_v->sd);
+        console.say("holes per {}^3 whichever the law: {:.4g} ({:.4g}..{:.4g}); the numbers of the "
+                    "laws differ from it by {:.4g}",
+                    per, ranking.n_v->mean, ranking.n_v->lo, ranking.n_v->hi, ranking.n_v->sd);
     for (const std::string& note : ranking.notes)
         console.say_text(note);
 }
