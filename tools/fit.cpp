@@ -30,18 +30,23 @@ struct FitArgs {
     AssessSettings assess;
 };
 
-/// The tables of the thesis, from binned counts.
+/// The tables of the thesis, from binned counts; its F3 is a law to draw from, if asked for.
 void run_thesis(const FitArgs& args, const Measurements& measurements, const Console& console) {
-    if (!args.out.empty())
-        throw Error(Fault::bad_argument,
-                    "fit: --method thesis prints its tables and fits no law; drop "
-                    "-o, or use --method ml");
     if (measurements.sample.bins.empty())
         throw Error(Fault::bad_input, args.files.front().string() +
                                           ": the thesis' method takes binned counts "
                                           "(diameter_lo,diameter_hi,count); bin the diameters");
     const ThesisInversion inversion = thesis_inversion(measurements.sample.bins);
     const std::vector<ThesisTest> tests = thesis_tests(inversion);
+    if (!args.out.empty()) {
+        LawFile file;
+        file.law = empirical_law(inversion);
+        file.unit = measurements.sample.unit;
+        file.n_profiles = n_profiles(measurements.sample);
+        file.source = measurements.sources;
+        write_file(args.out, format_law_file(file));
+        console.say("{}: the thesis' F3 as a law to draw from", args.out.string());
+    }
     if (!console.json) {
         fmt::print("{}", format_thesis_tables(inversion, tests));
         return;
