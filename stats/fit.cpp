@@ -16,6 +16,7 @@ namespace {
 
 constexpr std::uint64_t kFewestProfiles = 8, kFewProfiles = 20;
 constexpr double kLeastLength = 1e-9, kMostLength = 1e9;
+constexpr double kHiddenShare = 0.14; // see LawRanking
 
 void check_settings(const Sample& sample, Family family, const FitSettings& settings) {
     if (!(settings.level >= 0.5 && settings.level <= 0.9999))
@@ -68,19 +69,40 @@ std::optional<double> resolution_for(const Sample& sample, Family family,
     return 0.01 * *std::max_element(sample.diameters.begin(), sample.diameters.end());
 }
 
+Interval with(Interval interval, double value) {
+    return {std::min(interval.lo, value), std::max(interval.hi, value)};
+}
+
+Interval interval_of(const NumberPosterior& posterior, double level) {
+    return {posterior.quantile((1 - level) / 2), posterior.quantile((1 + level) / 2)};
+}
+
 std::string percent(double share) {
     return std::to_string(static_cast<int>(std::lround(100 * share))) + " %";
 }
 
-NumberDensity number_density(Likelihood& likelihood, const Peak& peak, double area, double level) {
-    const NumberPosterior posterior(likelihood, peak, area);
-    NumberDensity n_v;
-    n_v.estimate = likelihood.n() /
-                   (area * std::exp(peak.log_mean) * likelihood.seen(peak.log_mean, peak.shape));
-    n_v.lo = std::min(n_v.estimate, posterior.quantile((1 - level) / 2));
-    n_v.hi = std::max(n_v.estimate, posterior.quantile((1 + level) / 2));
-    return n_v;
+Detection detection_for(const Sample& sample, Family family, const FitSettings& settings) {
+    check_settings(sample, family, settings);
+    Detection detection(sample);
+    check_profiles(sample);
+    check_spread(sample, family, detection.limit());
+    return detection;
 }
+
+// A sample, seen through its limits and edges, and the likeliest law of one family.
+struct Search {
+    Search(const Sample& sample, Family family, const FitSettings& settings)
+        : detection(detection_for(sample, family, settings)),
+          likelihood(sample, detection, family, resolution_for(sample, family, settings)),
+          peak(find_peak(likelihood)) {}
+    Search(const Search&) = delete; // the likelihood refers to the detection
+
+    Law law() const { return law_at(likelihood.family(), peak.log_mean, peak.shape); }
+
+    Detection detection;
+    Likelihood likelihood;
+    Peak peak;
+};
 
 void add_notes(Fit& fit, const Peak& peak, bool open) {
     if (fit.n_profiles < kFewProfiles)
@@ -99,51 +121,125 @@ void add_notes(Fit& fit, const Peak& peak, bool open) {
                             "were not seen by anybody.");
 }
 
-} // namespace
+struct FitParts {
+    Fit fit;
+    std::vector<LawPart> parts; // what else the law may be
+};
 
-Fit fit_law(const Sample& sample, Family family, const FitSettings& settings) {
-    check_settings(sample, family, settings);
-    const Detection detection(sample);
-    check_profiles(sample);
-    check_spread(sample, family, detection.limit());
-    Likelihood likelihood(sample, detection, family, resolution_for(sample, family, settings));
-    const Peak peak = find_peak(likelihood);
-    Fit fit{law_at(family, peak.log_mean, peak.shape),
-            {},
+FitParts fit_parts(const Sample& sample, Family family, const FitSettings& settings) {
+    Search search(sample, family, settings);
+    const Peak& peak = search.peak;
+    const double n = search.likelihood.n(),
+                 depth = 0.5 * chi_squared_critical(1, 1 - settings.level);
+    Region region = likelihood_region(search.likelihood, peak, peak.log_likelihood - depth);
+    std::vector<LawPart> parts = law_parts(search.likelihood, peak);
+    Fit fit{search.law(),
+            std::move(region.intervals),
+            with(region.mean_diameter, std::exp(peak.log_mean)),
             settings.level,
             peak.log_likelihood,
             0,
             {},
-            detection.limit(),
+            search.detection.limit(),
             n_profiles(sample),
             {}};
-    const double n = likelihood.n();
     const auto k = static_cast<double>(parameter_names(family).size());
     fit.aicc = 2 * k - 2 * fit.log_likelihood + 2 * k * (k + 1) / (n - k - 1);
-    const double depth = 0.5 * chi_squared_critical(1, 1 - settings.level);
-    Region region = likelihood_region(likelihood, peak, fit.log_likelihood - depth);
-    fit.intervals = std::move(region.intervals);
-    for (std::size_t i = 0; i < fit.intervals.size();
-         ++i) { // the search ends before the last digit
-        fit.intervals[i].lo = std::min(fit.intervals[i].lo, fit.law.parameters()[i]);
-        fit.intervals[i].hi = std::max(fit.intervals[i].hi, fit.law.parameters()[i]);
-    }
-    if (detection.area()) {
-        fit.n_v = number_density(likelihood, peak, *detection.area(), settings.level);
-        fit.n_v->extrapolated_share = fit.law.cdf(detection.limit());
+    for (std::size_t i = 0; i < fit.intervals.size(); ++i) // the search ends before the last digit
+        fit.intervals[i] = with(fit.intervals[i], fit.law.parameters()[i]);
+    if (const auto area = search.detection.area()) {
+        const NumberPosterior posterior(parts, n, *area);
+        const double seen = search.likelihood.seen(peak.log_mean, peak.shape);
+        const double estimate = n / (*area * std::exp(peak.log_mean) * seen);
+        const Interval interval = with(interval_of(posterior, settings.level), estimate);
+        fit.n_v = {estimate, interval.lo, interval.hi, fit.law.cdf(fit.detection_limit)};
     }
     add_notes(fit, peak, region.open);
-    return fit;
+    return {std::move(fit), std::move(parts)};
+}
+
+std::vector<double> normalised(std::vector<double> weights) {
+    const double sum = std::accumulate(weights.begin(), weights.end(), 0.0);
+    for (double& weight : weights)
+        weight /= sum;
+    return weights;
+}
+
+std::vector<double> akaike_weights(std::span<const FitParts> fits) {
+    std::vector<double> weights;
+    for (const FitParts& f : fits)
+        weights.push_back(std::exp(0.5 * (fits.front().fit.aicc - f.fit.aicc)));
+    return normalised(std::move(weights));
+}
+
+std::vector<double> schwarz_weights(std::span<const FitParts> fits) {
+    const auto criterion = [](const Fit& fit) { // half of it, as a likelihood
+        return fit.log_likelihood - 0.5 * static_cast<double>(fit.intervals.size()) *
+                                        std::log(static_cast<double>(fit.n_profiles));
+    };
+    double best = criterion(fits.front().fit);
+    for (const FitParts& f : fits)
+        best = std::max(best, criterion(f.fit));
+    std::vector<double> weights;
+    for (const FitParts& f : fits)
+        weights.push_back(std::exp(criterion(f.fit) - best));
+    return normalised(std::move(weights));
+}
+
+// The parts of all families, by the weights of these and a prior of the share that is hidden.
+template <class Prior>
+std::vector<LawPart> join(std::span<const FitParts> fits, std::span<const double> weights,
+                          Prior prior) {
+    std::vector<LawPart> all;
+    for (std::size_t i = 0; i < fits.size(); ++i)
+        for (LawPart part : fits[i].parts) {
+            part.weight *= weights[i] * prior(1 - part.above);
+            all.push_back(part);
+        }
+    return all;
+}
+
+// What every law of every family may be, for intervals.
+std::vector<LawPart> all_parts(std::span<const FitParts> fits, std::span<const double> weights) {
+    return join(fits, weights, [](double hidden) { return 1 - hidden; });
+}
+
+LawRanking::AllLaws number_by_all(std::span<const FitParts> fits, std::span<const double> weights,
+                                  double area) {
+    const auto prior = [](double hidden) {
+        return std::exp(-0.5 * std::pow(hidden / kHiddenShare, 2));
+    };
+    const std::vector<double> schwarz = schwarz_weights(fits);
+    const Fit& first = fits.front().fit;
+    const auto n = static_cast<double>(first.n_profiles);
+    double sum = 0, exposure = 0, squares = 0;
+    LawRanking::AllLaws n_v;
+    for (const LawPart& part : join(fits, schwarz, prior)) {
+        sum += part.weight;
+        exposure += part.weight * part.exposure;
+        squares += part.weight * part.exposure * part.exposure;
+        n_v.extrapolated_share += part.weight * (1 - part.above);
+    }
+    n_v.extrapolated_share /= sum;
+    n_v.mean = n / area * exposure / squares;
+    for (std::size_t i = 0; i < fits.size(); ++i)
+        n_v.sd += weights[i] * std::pow(fits[i].fit.n_v->estimate - n_v.mean, 2);
+    n_v.sd = std::sqrt(n_v.sd);
+    const NumberPosterior posterior(all_parts(fits, weights), n, area);
+    const Interval interval = with(interval_of(posterior, first.level), n_v.mean);
+    n_v.lo = interval.lo;
+    n_v.hi = interval.hi;
+    return n_v;
+}
+
+} // namespace
+
+Fit fit_law(const Sample& sample, Family family, const FitSettings& settings) {
+    return fit_parts(sample, family, settings).fit;
 }
 
 Law likeliest_law(const Sample& sample, Family family, const FitSettings& settings) {
-    check_settings(sample, family, settings);
-    const Detection detection(sample);
-    check_profiles(sample);
-    check_spread(sample, family, detection.limit());
-    Likelihood likelihood(sample, detection, family, resolution_for(sample, family, settings));
-    const Peak peak = find_peak(likelihood);
-    return law_at(family, peak.log_mean, peak.shape);
+    return Search(sample, family, settings).law();
 }
 
 LawRanking fit_laws(const Sample& sample, std::span<const Family> families,
@@ -164,10 +260,11 @@ LawRanking fit_laws(const Sample& sample, std::span<const Family> families,
                                    std::to_string(kFewProfiles) +
                                    " profiles cannot tell one law from another.");
     }
+    std::vector<FitParts> fits;
     std::optional<Error> first;
     for (const Family family : families) {
         try {
-            ranking.fits.push_back(fit_law(sample, family, settings));
+            fits.push_back(fit_parts(sample, family, settings));
         } catch (const Error& e) {
             if (e.fault() == Fault::bad_argument)
                 throw;
@@ -176,24 +273,18 @@ LawRanking fit_laws(const Sample& sample, std::span<const Family> families,
             ranking.notes.push_back(std::string(family_name(family)) + " left out: " + e.what());
         }
     }
-    if (ranking.fits.empty())
+    if (fits.empty())
         throw *first;
-    std::stable_sort(ranking.fits.begin(), ranking.fits.end(),
-                     [](const Fit& a, const Fit& b) { return a.aicc < b.aicc; });
-    for (const Fit& fit : ranking.fits)
-        ranking.weights.push_back(std::exp(0.5 * (ranking.fits.front().aicc - fit.aicc)));
-    const double sum = std::accumulate(ranking.weights.begin(), ranking.weights.end(), 0.0);
-    for (double& weight : ranking.weights)
-        weight /= sum;
-    if (!ranking.fits.front().n_v)
-        return ranking;
-    LawRanking::Spread spread;
-    for (std::size_t i = 0; i < ranking.fits.size(); ++i)
-        spread.mean += ranking.weights[i] * ranking.fits[i].n_v->estimate;
-    for (std::size_t i = 0; i < ranking.fits.size(); ++i)
-        spread.sd += ranking.weights[i] * std::pow(ranking.fits[i].n_v->estimate - spread.mean, 2);
-    spread.sd = std::sqrt(spread.sd);
-    ranking.n_v = spread;
+    std::stable_sort(fits.begin(), fits.end(),
+                     [](const FitParts& a, const FitParts& b) { return a.fit.aicc < b.fit.aicc; });
+    for (const FitParts& f : fits)
+        ranking.fits.push_back(f.fit);
+    ranking.weights = akaike_weights(fits);
+    const std::vector<LawPart> all = all_parts(fits, ranking.weights);
+    ranking.mean_diameter = {mean_quantile(all, (1 - settings.level) / 2),
+                             mean_quantile(all, (1 + settings.level) / 2)};
+    if (const auto area = searched_area(sample))
+        ranking.n_v = number_by_all(fits, ranking.weights, *area);
     return ranking;
 }
 

@@ -18,8 +18,11 @@
 namespace taihu {
 namespace {
 
-// Without promotion to long double, whose width differs from machine to machine.
-using Policy = boost::math::policies::policy<boost::math::policies::promote_double<false>>;
+// Without promotion to long double, whose width differs from machine to machine; the gamma function
+// of a large shape may overflow on the way to a CDF of 0.
+using Policy = boost::math::policies::policy<
+    boost::math::policies::promote_double<false>,
+    boost::math::policies::overflow_error<boost::math::policies::ignore_error>>;
 
 constexpr std::array<std::string_view, 8> kFamilies = {
     "exponential",      "gamma",   "weibull",  "lognormal",

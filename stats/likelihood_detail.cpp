@@ -101,6 +101,10 @@ Law law_at(Family family, double log_mean, double shape) {
     return Law(family, std::span(all).first(parameter_names(family).size()));
 }
 
+double log_prior(Family family, double shape) {
+    return family == Family::gamma || family == Family::weibull ? std::min(0.0, shape) : 0;
+}
+
 UnitSection::UnitSection(Family family, double shape)
     : section_(law_at(family, 0, shape)),
       closed_(family == Family::exponential || !shape_range(family) || family == Family::uniform) {
@@ -301,7 +305,7 @@ double Likelihood::log_seen(double log_mean) const {
 
 double Likelihood::operator()(double log_mean, double shape) {
     prepare(log_mean, shape);
-    double sum = constant_ - n_ * log_seen(log_mean);
+    double sum = constant_ - n_ * log_seen(log_mean) + log_prior(family_, shape);
     for (const Point& p : points_)
         sum += p.count * (section_->log_pdf(p.log_d - log_mean) - log_mean);
     for (const Cell& cell : cells_)
@@ -313,6 +317,11 @@ double Likelihood::operator()(double log_mean, double shape) {
 double Likelihood::seen(double log_mean, double shape) {
     prepare(log_mean, shape);
     return std::exp(log_seen(log_mean));
+}
+
+double Likelihood::above(double log_mean, double shape) {
+    prepare(log_mean, shape);
+    return 1 - section_->law().cdf(detection_->limit() * std::exp(-log_mean));
 }
 
 } // namespace taihu

@@ -42,6 +42,7 @@ Law law_at(Family family, double log_mean, double shape);
 class UnitSection {
 public:
     UnitSection(Family family, double shape);
+    const Law& law() const { return section_.law(); }
     /// Computes what is missing for log d in lo..hi, which must be done before they are asked for.
     void cover(double lo, double hi);
     double log_pdf(double log_d) const;
@@ -66,10 +67,16 @@ private:
     std::vector<double> log_cosh_, cosh_; ///< at multiples of step_
 };
 
+/// What a gamma or Weibull law pays for a shape k below 1, where its density is infinite at 0: log
+/// k. The profiles say next to nothing about such a law's small holes, whose number runs away; a
+/// likelihood that is flat there ends at 1 instead, the exponential law. Other laws pay nothing.
+double log_prior(Family family, double shape);
+
 /// The log-likelihood of a sample as a function of the law, for one family.
 ///
 /// A diameter counts with the density f2 g / int f2 g, or with its mean over the resolution; a bin
-/// with its probability. Not thread-safe: it remembers the sections of the last shape.
+/// with its probability; log_prior is added. Not thread-safe: it remembers the sections of the last
+/// shape.
 class Likelihood {
 public:
     /// Lower than any likelihood, but a number: methods that draw parabolas need one.
@@ -83,6 +90,8 @@ public:
     double operator()(double log_mean, double shape);
     /// int f2 g: the share of sections that are marked.
     double seen(double log_mean, double shape);
+    /// 1 - F3 of the detection limit: the share of holes that are above it.
+    double above(double log_mean, double shape);
 
     Family family() const { return family_; }
     double n() const { return n_; }

@@ -1,6 +1,7 @@
 #include "stats/peak_detail.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstdint>
 #include <functional>
@@ -18,8 +19,11 @@
 namespace taihu {
 namespace {
 
-// Without promotion to long double, whose width differs from machine to machine.
-using Policy = boost::math::policies::policy<boost::math::policies::promote_double<false>>;
+// Without promotion to long double, whose width differs from machine to machine; the gamma function
+// of a large shape may overflow on the way to a CDF of 0.
+using Policy = boost::math::policies::policy<
+    boost::math::policies::promote_double<false>,
+    boost::math::policies::overflow_error<boost::math::policies::ignore_error>>;
 
 // How far the logarithm of the mean may run from where it started: a factor 1.6e5, past which the
 // sizes differ by less than 1e-5.
@@ -159,6 +163,12 @@ double shape_end(Ridge& ridge, const Peak& peak, double floor, double end, bool&
     }
 }
 
+// The parameters, and the mean as a third.
+std::array<double, 3> values_at(Family family, double log_mean, double shape) {
+    const auto [a, b] = parameters_at(family, log_mean, shape);
+    return {a, b, std::exp(log_mean)};
+}
+
 // Shapes from one end of the region to the other, dense at the ends, where the region closes.
 double shape_at(const Interval& shapes, double angle) {
     return 0.5 * (shapes.lo + shapes.hi) + 0.5 * (shapes.hi - shapes.lo) * std::sin(angle);
@@ -178,7 +188,7 @@ Region region_of_one(Likelihood& likelihood, const Peak& peak, double floor) {
         refuse_no_maximum(likelihood.family());
     const double a = parameters_at(likelihood.family(), lo, 0)[0];
     const double b = parameters_at(likelihood.family(), hi, 0)[0];
-    return {{{std::min(a, b), std::max(a, b)}}, false};
+    return {{{std::min(a, b), std::max(a, b)}}, {std::exp(lo), std::exp(hi)}, false};
 }
 
 } // namespace
@@ -230,15 +240,15 @@ Region likelihood_region(Likelihood& likelihood, const Peak& peak, double floor)
     const double lo = shape_end(ridge, peak, floor, range->lo, region.open);
     region.open &= !range->lo_is_natural;
     const Interval shapes = {lo, shape_end(ridge, peak, floor, range->hi, region.open)};
-    // An extreme parameter on the slice at this angle.
-    const auto value = [&](double angle, std::size_t parameter, double direction) {
+    // An extreme value on the slice at this angle.
+    const auto value = [&](double angle, std::size_t which, double direction) {
         const double shape = shape_at(shapes, angle);
         const Top top = ridge.top(shape);
         const double end = ridge.end(shape, top, floor, direction, 18);
         region.open |= std::isnan(end) || top.far;
-        return parameters_at(family, std::isnan(end) ? top.at : end, shape)[parameter];
+        return values_at(family, std::isnan(end) ? top.at : end, shape)[which];
     };
-    std::array<std::array<std::array<double, 2>, 2>, kSlices + 1> ends{}; // [slice][side][which]
+    std::array<std::array<std::array<double, 3>, 2>, kSlices + 1> ends{}; // [slice][side][which]
     for (int i = 0; i <= kSlices; ++i) {
         const double shape = shape_at(shapes, slice_angle(i));
         const Top top = ridge.top(shape);
@@ -246,21 +256,21 @@ Region likelihood_region(Likelihood& likelihood, const Peak& peak, double floor)
             const double end = ridge.end(shape, top, floor, side == 0 ? -1 : 1, 18);
             region.open |= std::isnan(end) || top.far;
             ends[static_cast<std::size_t>(i)][static_cast<std::size_t>(side)] =
-                parameters_at(family, std::isnan(end) ? top.at : end, shape);
+                values_at(family, std::isnan(end) ? top.at : end, shape);
         }
     }
     // For one shape every parameter moves one way with the mean, so its extremes are at the ends.
-    const auto extreme = [&](std::size_t parameter, double sign) {
+    const auto extreme = [&](std::size_t which, double sign) {
         std::size_t slice = 0, side = 0;
         for (std::size_t i = 0; i <= kSlices; ++i)
             for (const std::size_t s : {0U, 1U})
-                if (sign * ends[i][s][parameter] > sign * ends[slice][side][parameter])
+                if (sign * ends[i][s][which] > sign * ends[slice][side][which])
                     slice = i, side = s;
-        const double found = ends[slice][side][parameter];
+        const double found = ends[slice][side][which];
         if (slice == 0 || slice == kSlices)
             return found;
         const auto at = [&](double angle) {
-            return -sign * value(angle, parameter, side == 0 ? -1 : 1);
+            return -sign * value(angle, which, side == 0 ? -1 : 1);
         };
         const int i = static_cast<int>(slice);
         const double better = -sign * boost::math::tools::brent_find_minima(at, slice_angle(i - 1),
@@ -270,11 +280,11 @@ Region likelihood_region(Likelihood& likelihood, const Peak& peak, double floor)
     };
     for (std::size_t p = 0; p < parameter_names(family).size(); ++p)
         region.intervals.push_back({extreme(p, -1), extreme(p, 1)});
+    region.mean_diameter = {extreme(2, -1), extreme(2, 1)};
     return region;
 }
 
-NumberPosterior::NumberPosterior(Likelihood& likelihood, const Peak& peak, double area)
-    : shape_(likelihood.n() + 0.5) {
+std::vector<LawPart> law_parts(Likelihood& likelihood, const Peak& peak) {
     // Of a bell: the trapezoid rule converges faster than any power of the number of points.
     const auto range = shape_range(likelihood.family());
     const int n_means = range ? 16 : 60, n_shapes = range ? 20 : 0;
@@ -286,6 +296,7 @@ NumberPosterior::NumberPosterior(Likelihood& likelihood, const Peak& peak, doubl
     if (range)
         shapes = {shape_end(ridge, peak, peak.log_likelihood - depth, range->lo, open),
                   shape_end(ridge, peak, peak.log_likelihood - depth, range->hi, open)};
+    std::vector<LawPart> parts;
     double sum = 0;
     for (int j = 0; j <= n_shapes; ++j) {
         const double shape =
@@ -297,36 +308,60 @@ NumberPosterior::NumberPosterior(Likelihood& likelihood, const Peak& peak, doubl
         double hi = ridge.end(shape, top, top.height - depth, 1, bits);
         lo = std::isnan(lo) ? top.at - kFarthest : lo;
         hi = std::isnan(hi) ? top.at + kFarthest : hi;
+        const double width = (hi - lo) / n_means;
         for (int i = 0; i <= n_means; ++i) {
-            const double log_mean = lo + (hi - lo) * i / n_means;
+            const double log_mean = lo + width * i;
             const double weight =
-                (hi - lo) * std::exp(likelihood(log_mean, shape) - peak.log_likelihood);
-            if (!(weight > 1e-9 * (hi - lo)))
+                width * std::exp(likelihood(log_mean, shape) - peak.log_likelihood);
+            if (!(weight > 1e-9 * width))
                 continue;
-            parts_.push_back(
-                {weight, area * std::exp(log_mean) * likelihood.seen(log_mean, shape)});
+            const double exposure = std::exp(log_mean) * likelihood.seen(log_mean, shape);
+            parts.push_back({weight, log_mean, width, exposure, likelihood.above(log_mean, shape)});
             sum += weight;
         }
     }
-    for (Part& part : parts_)
+    for (LawPart& part : parts)
         part.weight /= sum;
+    return parts;
+}
+
+NumberPosterior::NumberPosterior(std::vector<LawPart> parts, double n, double area)
+    : parts_(std::move(parts)), shape_(n + 0.5), area_(area) {
+    for (const LawPart& part : parts_)
+        sum_ += part.weight;
 }
 
 double NumberPosterior::cdf(double n_v) const {
-    double sum = 0;
-    for (const Part& part : parts_)
-        sum += part.weight * boost::math::gamma_p(shape_, n_v * part.exposure, Policy());
-    return sum;
+    double below = 0;
+    for (const LawPart& part : parts_)
+        below += part.weight * boost::math::gamma_p(shape_, n_v * area_ * part.exposure, Policy());
+    return below / sum_;
 }
 
 double NumberPosterior::quantile(double share) const {
-    double hi = shape_ / parts_.front().exposure, lo = hi;
+    double hi = shape_ / (area_ * parts_.front().exposure), lo = hi;
     while (cdf(hi) < share)
         hi *= 1.5;
     while (cdf(lo) > share)
         lo /= 1.5;
     return root([&](double n_v) { return share - cdf(n_v); }, lo, hi, share - cdf(lo),
                 share - cdf(hi), 34);
+}
+
+double mean_quantile(std::span<const LawPart> parts, double share) {
+    double sum = 0, lo = parts.front().log_mean, hi = lo;
+    for (const LawPart& part : parts) {
+        sum += part.weight;
+        lo = std::min(lo, part.log_mean - part.width);
+        hi = std::max(hi, part.log_mean + part.width);
+    }
+    const auto missing = [&](double log_mean) {
+        double below = 0;
+        for (const LawPart& p : parts)
+            below += p.weight * std::clamp((log_mean - p.log_mean) / p.width + 0.5, 0.0, 1.0);
+        return share - below / sum;
+    };
+    return std::exp(root(missing, lo, hi, missing(lo), missing(hi), 34));
 }
 
 } // namespace taihu

@@ -1,4 +1,5 @@
 #pragma once
+#include <span>
 #include <vector>
 
 #include "stats/fit.h"
@@ -21,30 +22,42 @@ Peak find_peak(Likelihood& likelihood);
 
 struct Region {
     std::vector<Interval> intervals; ///< of the parameters, in the order of parameter_names()
-    bool open = false;               ///< an end is where the search ended
+    Interval mean_diameter;
+    bool open = false; ///< an end is where the search ended
 };
 
-/// The extremes of each parameter where the likelihood has not fallen to `floor`: the ends of the
-/// profile likelihood's intervals.
+/// The extremes of each parameter, and of the mean, where the likelihood has not fallen to `floor`:
+/// the ends of the profile likelihood's intervals.
 /// \throws Error numeric: a family of one parameter whose likelihood does not fall to the floor.
 Region likelihood_region(Likelihood& likelihood, const Peak& peak, double floor);
 
-/// A mixture of Gamma(n + 1/2, exposure) laws: what N_V may be, averaged over the likelihood of the
-/// law with a flat prior of log mean and shape.
+/// One of the laws that the likelihood allows, for averages over all of them.
+struct LawPart {
+    double weight =
+        0; ///< likelihood, with a flat prior of log mean and shape; of one family, sum 1
+    double log_mean = 0, width = 0; ///< stands for log means of this width
+    double exposure = 0;            ///< profiles per area and hole per volume: mean * int f2 g
+    double above = 1;               ///< share of its holes above the detection limit
+};
+
+/// About 60 parts of a family of one parameter, 350 of two.
+std::vector<LawPart> law_parts(Likelihood& likelihood, const Peak& peak);
+
+/// What N_V may be: Gamma(n + 1/2, area * exposure) laws, mixed by weights that need not sum to 1.
 class NumberPosterior {
 public:
-    NumberPosterior(Likelihood& likelihood, const Peak& peak, double area);
+    NumberPosterior(std::vector<LawPart> parts, double n, double area);
     /// N_V with this share of its probability below, to 1e-10.
     double quantile(double share) const;
 
 private:
-    struct Part {
-        double weight, exposure;
-    };
     double cdf(double n_v) const;
 
-    double shape_;
-    std::vector<Part> parts_;
+    std::vector<LawPart> parts_;
+    double shape_, area_, sum_ = 0;
 };
+
+/// The mean diameter with this share of the parts' weight below.
+double mean_quantile(std::span<const LawPart> parts, double share);
 
 } // namespace taihu

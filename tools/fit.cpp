@@ -30,18 +30,23 @@ struct FitArgs {
     AssessSettings assess;
 };
 
-/// The tables of the thesis, from binned counts.
+/// The tables of the thesis, from binned counts; its F3 is a law to draw from, if asked for.
 void run_thesis(const FitArgs& args, const Measurements& measurements, const Console& console) {
-    if (!args.out.empty())
-        throw Error(Fault::bad_argument,
-                    "fit: --method thesis prints its tables and fits no law; drop "
-                    "-o, or use --method ml");
     if (measurements.sample.bins.empty())
         throw Error(Fault::bad_input, args.files.front().string() +
                                           ": the thesis' method takes binned counts "
                                           "(diameter_lo,diameter_hi,count); bin the diameters");
     const ThesisInversion inversion = thesis_inversion(measurements.sample.bins);
     const std::vector<ThesisTest> tests = thesis_tests(inversion);
+    if (!args.out.empty()) {
+        LawFile file;
+        file.law = empirical_law(inversion);
+        file.unit = measurements.sample.unit;
+        file.n_profiles = n_profiles(measurements.sample);
+        file.source = measurements.sources;
+        write_file(args.out, format_law_file(file));
+        console.say("{}: the thesis' F3 as a law to draw from", args.out.string());
+    }
     if (!console.json) {
         fmt::print("{}", format_thesis_tables(inversion, tests));
         return;
@@ -92,8 +97,9 @@ void tell_ranking(const LawRanking& ranking, const std::string& per, const Conso
     if (ranking.fits.size() > 1)
         console.say("weights of the laws (Akaike): {}", line);
     if (ranking.fits.size() > 1 && ranking.n_v)
-        console.say("holes per {}^3 by all of them: {:.4g}, standard deviation {:.4g}", per,
-                    ranking.n_v->mean, ranking.n_v->sd);
+        console.say("holes per {}^3 whichever the law: {:.4g} ({:.4g}..{:.4g}); the numbers of the "
+                    "laws differ from it by {:.4g}",
+                    per, ranking.n_v->mean, ranking.n_v->lo, ranking.n_v->hi, ranking.n_v->sd);
     for (const std::string& note : ranking.notes)
         console.say_text(note);
 }

@@ -58,6 +58,16 @@ TEST(LawAt, HasTheMeanItWasAskedFor) {
     EXPECT_NEAR(law_at(Family::constant, 0.7, 0).mean(), std::exp(0.7), 1e-12);
 }
 
+TEST(LogPrior, IsPaidByDensitiesThatAreInfiniteAtZero) {
+    for (const Family family : {Family::gamma, Family::weibull}) {
+        EXPECT_DOUBLE_EQ(log_prior(family, std::log(0.25)), std::log(0.25));
+        EXPECT_EQ(log_prior(family, 0), 0);
+        EXPECT_EQ(log_prior(family, 2), 0);
+    }
+    EXPECT_EQ(log_prior(Family::lognormal, -2), 0);
+    EXPECT_EQ(log_prior(Family::exponential, 0), 0);
+}
+
 TEST(Likelihood, IsTheSumOfLogDensities) {
     Sample sample;
     sample.diameters = {0.5, 0.5, 0.9, 1.7};
@@ -68,7 +78,7 @@ TEST(Likelihood, IsTheSumOfLogDensities) {
             continue; // ends before the greatest profile
         Likelihood likelihood(sample, detection, family, {});
         const SectionLaw section(law_at(family, 0.2, shape));
-        double sum = 0;
+        double sum = log_prior(family, shape);
         for (const double d : sample.diameters)
             sum += section.log_pdf(d) - section.log_survival(0.4);
         if (sum > -60) { // as above

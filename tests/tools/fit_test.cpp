@@ -143,6 +143,18 @@ TEST(Fit, SaysWhetherProfilesObeyALaw) {
     EXPECT_THAT(more.err, HasSubstr("number of profiles: 60 found"));
 }
 
+TEST(Fit, TheThesisTableIsALawToDrawFrom) {
+    const Scratch folder;
+    const std::string rock1 = TAIHU_DATA "/measurements/rock1.csv";
+    ASSERT_EQ(run("taihu fit " + rock1 + " --method thesis -o t.json", folder.path()).exit_code, 0);
+    const json law = json::parse(read_file(folder / "t.json"));
+    EXPECT_EQ(law["family"], "empirical");
+    EXPECT_EQ(law["n_profiles"], 46);
+    EXPECT_EQ(run("taihu sample t.json --box 1 --scale 20cm --count 50 -o h.csv", folder.path())
+                  .exit_code,
+              0);
+}
+
 TEST(Fit, RefusesWhatDoesNotGoTogether) {
     const Scratch folder;
     draw_photo(folder);
