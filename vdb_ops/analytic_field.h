@@ -1,31 +1,41 @@
 #pragma once
 #include <functional>
+#include <span>
+#include <type_traits>
 
 #include "stats/core/box.h"
 #include "vdb_ops/field.h"
 
 namespace taihu {
 
-/// A solid given by a distance function: 1-Lipschitz, negative inside, exact near the surface.
+/// A solid given by a distance function: 1-Lipschitz, negative inside, exact near the surface. For
+/// spheres, boxes and their like use SolidsField, which is faster and turns them.
 class AnalyticField final : public Field {
 public:
-    /// \param box  holds the solid [m]; \param distance  [m], called from several threads.
-    AnalyticField(const Box& box, std::function<double(const Vec3&)> distance);
+    /// Distances at so many points [m], called from several threads with whole leaves.
+    using Distances = std::function<void(std::span<const Vec3> points, double* out)>;
+
+    /// \param box  holds the solid [m].
+    AnalyticField(const Box& box, Distances distances);
+
+    /// \param distance  of one point [m], called from several threads.
+    template <class Distance>
+    requires std::is_invocable_r_v<double, const Distance&, const Vec3&>
+    AnalyticField(const Box& box, Distance distance)
+        : AnalyticField(box, Distances([distance](std::span<const Vec3> points, double* out) {
+                            for (std::size_t i = 0; i < points.size(); ++i)
+                                out[i] = distance(points[i]);
+                        })) {}
+
     std::unique_ptr<LatticeField> on(const Lattice& lattice,
                                      const openvdb::CoordBBox& region) const override;
 
 private:
     Box box_;
-    std::function<double(const Vec3&)> distance_;
+    Distances distances_;
 };
 
-/// Exact signed distances of solids centred on the origin, axis +Y. Lengths [m], > 0.
+/// Exact signed distance of a box centred on the origin [m]; half sizes > 0.
 double box_distance(const Vec3& p, const Vec3& half_size);
-double cylinder_distance(const Vec3& p, double radius_m, double half_height_m);
-/// A ring round the Y axis: circle of radius `ring_m`, thick by `tube_m` (radii).
-double torus_distance(const Vec3& p, double ring_m, double tube_m);
-/// By bisection on the Lagrange multiplier of the nearest point (robust for any axes; Eberly,
-/// "Distance from a point to an ellipsoid", from memory, unchecked); error below 1e-12 of the size.
-double ellipsoid_distance(const Vec3& p, const Vec3& semi_axes);
 
 } // namespace taihu

@@ -10,15 +10,18 @@
 #include "stats/core/rng.h"
 #include "stats/core/sphere.h"
 #include "stats/core/text.h"
-#include "vdb_ops/analytic_field.h"
 #include "vdb_ops/balls_field.h"
 #include "vdb_ops/mesh_field.h"
+#include "vdb_ops/octant_mesh_detail.h"
+#include "vdb_ops/solids_field.h"
+#include "vdb_ops/superquadric_field.h"
 
 namespace taihu {
 namespace {
 
-constexpr std::array<std::string_view, 7> kNames = {"sphere", "ellipsoid", "box",    "cylinder",
-                                                    "torus",  "icosphere", "boulder"};
+constexpr std::array<std::string_view, 10> kNames = {
+    "sphere",  "ellipsoid", "box",          "rounded_box", "cylinder",
+    "capsule", "torus",     "superquadric", "icosphere",   "boulder"};
 constexpr std::uint32_t kNoiseStream = 0x626c6472;
 
 void check_range(const char* name, double value, double lo, double hi) {
@@ -29,6 +32,10 @@ void check_range(const char* name, double value, double lo, double hi) {
                                              "; choose a value in that range");
 }
 
+Superquadric superquadric(const ShapeSettings& s) {
+    return {s.size_m * 0.5, s.vertical, s.around};
+}
+
 void check_settings(const ShapeSettings& s) {
     check_range("size_m.x", s.size_m.x, 1e-9, 1e9);
     check_range("size_m.y", s.size_m.y, 1e-9, 1e9);
@@ -36,7 +43,8 @@ void check_settings(const ShapeSettings& s) {
     check_range("subdivisions", s.subdivisions, 0, 8);
     check_range("relief", s.relief, 0, 0.9);
     check_range("lumps", s.lumps, 0.1, 16);
-    const bool round = s.kind == ShapeKind::cylinder || s.kind == ShapeKind::torus;
+    const bool round =
+        s.kind == ShapeKind::cylinder || s.kind == ShapeKind::torus || s.kind == ShapeKind::capsule;
     if ((round || s.kind == ShapeKind::sphere) && s.size_m.x != s.size_m.z)
         throw Error(Fault::bad_argument, std::string("shape: a ") +
                                              std::string(shape_name(s.kind)) +
@@ -46,6 +54,14 @@ void check_settings(const ShapeSettings& s) {
                     "shape: a sphere has one size; give one number, or use ellipsoid");
     if (s.kind == ShapeKind::torus)
         check_range("tube_m", s.tube_m, 1e-9, 0.4999 * s.size_m.x);
+    if (s.kind == ShapeKind::capsule && s.size_m.y < s.size_m.x)
+        throw Error(Fault::bad_argument, "shape: a capsule is at least as high as it is wide; give "
+                                         "a larger Y size, or use ellipsoid");
+    if (s.kind == ShapeKind::rounded_box)
+        check_range("round_m", s.round_m, 1e-9,
+                    0.5 * std::min({s.size_m.x, s.size_m.y, s.size_m.z}));
+    if (s.kind == ShapeKind::superquadric)
+        check_superquadric(superquadric(s), "shape");
 }
 
 /// Icosphere of radius 1: 20 * 4^level triangles. Only + - * / sqrt, so the same everywhere.
@@ -171,16 +187,29 @@ TriMesh torus_mesh(double ring, double tube, int sides) {
     return mesh;
 }
 
+/// All points within `round` of a box of half sizes `core`, which may be flat or a segment.
+TriMesh rounded_mesh(const Vec3& core, double round, int n) {
+    const Quarter quarter(n, 1);
+    return octant_mesh(n, [&](const Vec3& sign, int lat, int lon) {
+        const auto i = static_cast<std::size_t>(lat), j = static_cast<std::size_t>(lon);
+        const Vec3 out{quarter.cos[i] * quarter.cos[j], quarter.sin[i],
+                       quarter.cos[i] * quarter.sin[j]};
+        const Vec3 p = core + out * round;
+        return Vec3{sign.x * p.x, sign.y * p.y, sign.z * p.z};
+    });
+}
+
 } // namespace
 
 ShapeKind shape_kind(std::string_view name) {
     for (std::size_t i = 0; i < kNames.size(); ++i)
         if (kNames[i] == name)
             return static_cast<ShapeKind>(i);
+    std::string known;
+    for (const std::string_view k : kNames)
+        known += (known.empty() ? "" : ", ") + std::string(k);
     throw Error(Fault::bad_argument, "shape: unknown kind '" + printable(name) + "'" +
-                                         did_you_mean(name, kNames) +
-                                         "; known are sphere, ellipsoid, box, cylinder, torus, "
-                                         "icosphere, boulder");
+                                         did_you_mean(name, kNames) + "; known are " + known);
 }
 
 std::string_view shape_name(ShapeKind kind) {
@@ -201,13 +230,21 @@ TriMesh shape_mesh(const ShapeSettings& s) {
     switch (s.kind) {
     case ShapeKind::box:
         return box_mesh(half);
+    case ShapeKind::rounded_box:
+        return rounded_mesh(half - Vec3{s.round_m, s.round_m, s.round_m}, s.round_m, sides / 4);
     case ShapeKind::cylinder:
         return cylinder_mesh(half.x, half.y, sides);
+    case ShapeKind::capsule:
+        return rounded_mesh({0, half.y - half.x, 0}, half.x, sides / 4);
     case ShapeKind::torus:
         return torus_mesh(half.x - s.tube_m / 2, s.tube_m / 2, sides);
+    case ShapeKind::superquadric:
+        return superquadric_mesh(superquadric(s), sides / 4);
     case ShapeKind::boulder:
         return boulder(s);
-    default:
+    case ShapeKind::sphere:
+    case ShapeKind::ellipsoid:
+    case ShapeKind::icosphere:
         break;
     }
     TriMesh mesh = icosphere(s.subdivisions);
@@ -216,32 +253,35 @@ TriMesh shape_mesh(const ShapeSettings& s) {
     return mesh;
 }
 
-std::unique_ptr<Field> shape_field(const ShapeSettings& s) {
+std::unique_ptr<Field> shape_field(const ShapeSettings& s, const Similarity& at) {
     check_settings(s);
     const Vec3 half = s.size_m * 0.5;
-    const Box box = shape_box(s);
+    const auto exact = [&at](const PrimitiveSolid& shape) {
+        return std::make_unique<SolidsField>(std::vector<AnalyticSolid>{{shape, at}});
+    };
     switch (s.kind) {
     case ShapeKind::sphere:
-        return std::make_unique<BallsField>(std::array<Sphere, 1>{{{{}, half.x}}});
+        return std::make_unique<BallsField>(std::array<Sphere, 1>{placed(Sphere{{}, half.x}, at)});
     case ShapeKind::ellipsoid:
-        return std::make_unique<AnalyticField>(
-            box, [half](const Vec3& p) { return ellipsoid_distance(p, half); });
+        return exact(EllipsoidSolid{half});
     case ShapeKind::box:
-        return std::make_unique<AnalyticField>(
-            box, [half](const Vec3& p) { return box_distance(p, half); });
+        return exact(BoxSolid{half});
+    case ShapeKind::rounded_box:
+        return exact(BoxSolid{half, s.round_m});
     case ShapeKind::cylinder:
-        return std::make_unique<AnalyticField>(
-            box, [half](const Vec3& p) { return cylinder_distance(p, half.x, half.y); });
+        return exact(CylinderSolid{half.x, half.y});
+    case ShapeKind::capsule:
+        return exact(CapsuleSolid{half.x, half.y - half.x});
     case ShapeKind::torus:
-        return std::make_unique<AnalyticField>(
-            box, [ring = half.x - s.tube_m / 2, tube = s.tube_m / 2](const Vec3& p) {
-                return torus_distance(p, ring, tube);
-            });
-    default:
+        return exact(TorusSolid{half.x - s.tube_m / 2, s.tube_m / 2});
+    case ShapeKind::superquadric:
+        return std::make_unique<SuperquadricField>(superquadric(s), at);
+    case ShapeKind::icosphere:
+    case ShapeKind::boulder:
         break;
     }
     return std::make_unique<MeshField>(
-        close_mesh(shape_mesh(s), std::string(shape_name(s.kind)), CloseRule::none));
+        close_mesh(placed(shape_mesh(s), at), std::string(shape_name(s.kind)), CloseRule::none));
 }
 
 } // namespace taihu

@@ -1,0 +1,33 @@
+#pragma once
+#include <openvdb/openvdb.h>
+
+#include "vdb_ops/field.h"
+#include "vdb_ops/similarity.h"
+
+namespace taihu {
+
+/// A level set anywhere: turned, scaled, moved, on any lattice, on a band of any width.
+///
+/// Values between voxels are trilinear, held within what 1-Lipschitz distances through the eight
+/// voxels around allow. Where the band asked for reaches farther than the grid's, the grid is
+/// widened first (widen_band()), so that no clamped value is ever taken for a distance. On its own
+/// lattice and not placed, the grid's values are handed on as they stand.
+///
+/// Details finer than a voxel of the lattice are aliased: sample a fine level set on a lattice not
+/// much coarser. on() costs the widened band, of half width / (grid's voxel in the lattice's
+/// voxels) + 2 of the grid's voxels; blocks are then random access.
+class PlacedLevelSetField final : public Field {
+public:
+    /// \throws Error bad_argument: null, or as lattice_of().
+    explicit PlacedLevelSetField(openvdb::FloatGrid::ConstPtr grid, const Similarity& at = {});
+    /// \throws Error bad_argument: a band of more than 1000 of the grid's voxels; unsupported: as
+    /// widen_band().
+    std::unique_ptr<LatticeField> on(const Lattice& lattice,
+                                     const openvdb::CoordBBox& region) const override;
+
+private:
+    openvdb::FloatGrid::ConstPtr grid_;
+    Similarity at_;
+};
+
+} // namespace taihu
