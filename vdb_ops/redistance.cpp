@@ -300,8 +300,8 @@ private:
         for (int i = 0; i < 512; ++i)
             given[halo_index(i / 64, i / 8 % 8, i % 8)] = leaf.given[static_cast<std::size_t>(i)];
         unsigned order = 0, faces = 0;
-        for (int quiet = 0; quiet < 8; order = (order + 1) & 7)
-            quiet = sweep(d, given, order) ? 0 : quiet + 1;
+        while (sweep(d, given, order)) // one without a change has seen that all is solved
+            order = (order + 3) & 7;
         for (int i = 0; i < 512; ++i)
             leaf.d[static_cast<std::size_t>(i)] = d[halo_index(i / 64, i / 8 % 8, i % 8)];
         for (int face = 0; face < 6; ++face)
