@@ -19,6 +19,8 @@
 namespace taihu {
 namespace {
 
+constexpr double kEmsShare = 0.1; // that EMS gives to each neighbouring class
+
 struct FitArgs {
     std::vector<std::filesystem::path> files;
     std::filesystem::path out, report, solid, expect;
@@ -184,7 +186,9 @@ std::optional<Law> unfolded(const FitArgs& args, const Sample& sample, const Con
     try {
         if (args.unfold == "isotonic")
             return unfold_isotonic(sample);
-        return (args.unfold == "saltykov" ? schwartz_saltykov(sample) : unfold_em(sample)).law();
+        if (args.unfold == "saltykov")
+            return schwartz_saltykov(sample).law();
+        return unfold_em(sample, {.smoothing = args.unfold == "ems" ? kEmsShare : 0}).law();
     } catch (const Error& e) {
         if (e.fault() == Fault::bad_argument)
             throw;
@@ -354,8 +358,8 @@ void add_fit_options(CLI::App& verb, FitArgs& args) {
         "[exponential,gamma,weibull,lognormal,constant]")
         ->delimiter(',');
     add("--unfold", args.unfold,
-        "Table of the photos alone, beside the law: em, isotonic or saltykov")
-        ->check(CLI::IsMember({"em", "isotonic", "saltykov"}))
+        "Table of the photos alone, beside the law: em, ems (smoothed), isotonic or saltykov")
+        ->check(CLI::IsMember({"em", "ems", "isotonic", "saltykov"}))
         ->capture_default_str();
     add("--level", args.fit.level, "Of the intervals, 0.5..0.9999")
         ->check(CLI::Range(0.5, 0.9999))
