@@ -12,22 +12,21 @@ namespace taihu {
 namespace {
 
 struct ShapeArgs {
-    std::string kind, size = "1m", tube, voxel;
+    std::string kind, size = "1m", tube, round, voxel;
     std::filesystem::path out;
     ShapeSettings settings;
+    std::vector<double> exponents;
     std::optional<int> dim;
 };
 
 /// Options that the kind does not read are mistakes, not decoration.
 void refuse_unused(ShapeKind kind, const CLI::App& verb) {
     using enum ShapeKind;
-    const bool round = kind == sphere || kind == ellipsoid || kind == cylinder || kind == torus ||
-                       kind == icosphere || kind == boulder;
-    const std::pair<const char*, bool> uses[] = {{"--tube", kind == torus},
-                                                 {"--relief", kind == boulder},
-                                                 {"--lumps", kind == boulder},
-                                                 {"--seed", kind == boulder},
-                                                 {"--subdivisions", round}};
+    const std::pair<const char*, bool> uses[] = {
+        {"--round", kind == rounded_box},      {"--tube", kind == torus},
+        {"--exponents", kind == superquadric}, {"--relief", kind == boulder},
+        {"--lumps", kind == boulder},          {"--seed", kind == boulder},
+        {"--subdivisions", kind != box}};
     for (const auto& [option, used] : uses)
         if (!used && verb.get_option(option)->count() > 0)
             throw Error(Fault::bad_argument, std::string("shape: a ") +
@@ -43,6 +42,14 @@ void run(ShapeArgs& args, const CLI::App& verb, const Console& console) {
     args.settings.tube_m = args.tube.empty()
                                ? 0.25 * args.settings.size_m.x
                                : length_m("--tube", args.tube, {0, args.settings.size_m.x});
+    const Vec3& size = args.settings.size_m;
+    const double shortest_m = std::min({size.x, size.y, size.z});
+    args.settings.round_m =
+        args.round.empty() ? 0.2 * shortest_m : length_m("--round", args.round, {0, shortest_m});
+    if (!args.exponents.empty()) {
+        args.settings.vertical = args.exponents.front();
+        args.settings.around = args.exponents.back();
+    }
     const TriMesh mesh = shape_mesh(args.settings); // refuses settings out of range
     const Box box = shape_box(args.settings);
     check_solid_path(args.out);
@@ -85,17 +92,30 @@ void add_shape(CLI::App& app, Console& console) {
     auto* verb = console.verb(app, "shape", "Make a base shape as a level set or a mesh",
                               "  taihu shape boulder --size 0.7,1,0.6 --seed 7 -o base.ply\n"
                               "  taihu shape torus --size 1m --tube 30cm --dim 200 -o ring.vdb\n"
+                              "  taihu shape rounded_box --size 1,2,0.5 --round 5cm -o slab.glb\n"
+                              "  taihu shape superquadric --exponents 0.4,1 -o drum.obj\n"
                               "  taihu shape icosphere --subdivisions 4 -o ball.obj");
     ShapeSettings& s = args->settings;
     verb->add_option("kind", args->kind,
-                     "sphere, ellipsoid, box, cylinder, torus, icosphere or boulder")
+                     "sphere, ellipsoid, box, rounded_box, cylinder, capsule, torus, superquadric, "
+                     "icosphere or boulder")
         ->required();
     verb->add_option("-o,--output", args->out, "Where to write it (.vdb .obj .ply .stl .off .glb)")
         ->required();
     verb->add_option("--size", args->size, "Extent: one length, or X,Y,Z; the centre is the origin")
         ->capture_default_str();
+    verb->add_option("--round", args->round,
+                     "rounded_box: radius of its edges [a fifth of its shortest side]");
     verb->add_option("--tube", args->tube, "torus: thickness of the ring [a quarter of its width]");
-    verb->add_option("--subdivisions", s.subdivisions, "Round meshes: 20 * 4^N triangles, 0..8")
+    verb->add_option(
+            "--exponents", args->exponents,
+            "superquadric: of upright and of level sections, E or E,E, each 0.1..2; towards "
+            "0 boxes, 1 round, 2 diamonds [1]")
+        ->delimiter(',')
+        ->expected(1, 2)
+        ->check(CLI::Range(0.1, 2.0));
+    verb->add_option("--subdivisions", s.subdivisions,
+                     "Meshes: 20 * 4^N triangles, or 2 * 2^N sides, 0..8")
         ->check(CLI::Range(0, 8))
         ->capture_default_str();
     verb->add_option("--relief", s.relief, "boulder: height of its lumps / radius, 0..0.9")

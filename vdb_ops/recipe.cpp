@@ -61,14 +61,12 @@ Json recipe_json(const std::string& recipe) {
 std::string shape_node(const ShapeSettings& s) {
     Json body;
     body["size_m"] = {s.size_m.x, s.size_m.y, s.size_m.z};
-    if (s.kind == ShapeKind::torus)
-        body["tube_m"] = s.tube_m;
     if (s.kind == ShapeKind::rounded_box)
         body["round_m"] = s.round_m;
-    if (s.kind == ShapeKind::superquadric) {
-        body["vertical"] = s.vertical;
-        body["around"] = s.around;
-    }
+    if (s.kind == ShapeKind::torus)
+        body["tube_m"] = s.tube_m;
+    if (s.kind == ShapeKind::superquadric)
+        body["exponents"] = {s.vertical, s.around};
     if (s.kind == ShapeKind::icosphere || s.kind == ShapeKind::boulder)
         body["subdivisions"] = s.subdivisions;
     if (s.kind == ShapeKind::boulder) {

@@ -4,6 +4,8 @@
 #include <cmath>
 #include <numbers>
 #include <span>
+#include <tuple>
+#include <utility>
 
 #include <nlohmann/json.hpp>
 
@@ -62,14 +64,12 @@ public:
                                                   : static_cast<std::uint64_t>(v);
     }
     Vec3 vector(const char* key, double lo, double hi) const {
-        const json& v = body_.at(key);
-        const auto good = [&](const json& x) {
-            return x.is_number() && x.get<double>() >= lo && x.get<double>() <= hi;
-        };
-        if (!v.is_array() || v.size() != 3 || !std::all_of(v.begin(), v.end(), good))
-            refuse(where_, "'" + std::string(key) + "' is " + printable(v.dump(), 60) +
-                               "; must be three numbers in " + shortest(lo) + ".." + shortest(hi));
+        const json& v = numbers(key, 3, "three", lo, hi);
         return {v[0].get<double>(), v[1].get<double>(), v[2].get<double>()};
+    }
+    std::pair<double, double> pair(const char* key, double lo, double hi) const {
+        const json& v = numbers(key, 2, "two", lo, hi);
+        return {v[0].get<double>(), v[1].get<double>()};
     }
     template <class... Words>
     std::string word(const char* key, const char* fallback, Words... words) const {
@@ -85,6 +85,18 @@ public:
     }
 
 private:
+    const json& numbers(const char* key, std::size_t n, const char* words, double lo,
+                        double hi) const {
+        const json& v = body_.at(key);
+        const auto good = [&](const json& x) {
+            return x.is_number() && x.get<double>() >= lo && x.get<double>() <= hi;
+        };
+        if (!v.is_array() || v.size() != n || !std::all_of(v.begin(), v.end(), good))
+            refuse(where_, "'" + std::string(key) + "' is " + printable(v.dump(), 60) +
+                               "; must be " + words + " numbers in " + shortest(lo) + ".." +
+                               shortest(hi));
+        return v;
+    }
     const json& body_;
     std::string where_;
 };
@@ -153,7 +165,7 @@ Node parse_shape(ShapeKind kind, const json& body, const std::string& where, Rec
         case ShapeKind::rounded_box:
             return {body, where, {"size_m"}, {"round_m"}};
         case ShapeKind::superquadric:
-            return {body, where, {"size_m"}, {"vertical", "around"}};
+            return {body, where, {"size_m"}, {"exponents"}};
         default:
             return {body, where, {"size_m"}};
         }
@@ -162,8 +174,8 @@ Node parse_shape(ShapeKind kind, const json& body, const std::string& where, Rec
     s.tube_m = keys.number_or("tube_m", 0.25 * s.size_m.x, 1e-9, kMost_m);
     s.round_m = keys.number_or("round_m", 0.2 * std::min({s.size_m.x, s.size_m.y, s.size_m.z}),
                                1e-9, kMost_m);
-    s.vertical = keys.number_or("vertical", s.vertical, 0.1, 2);
-    s.around = keys.number_or("around", s.around, 0.1, 2);
+    if (keys.has("exponents"))
+        std::tie(s.vertical, s.around) = keys.pair("exponents", 0.1, 2);
     if (keys.has("subdivisions"))
         s.subdivisions = static_cast<int>(keys.whole("subdivisions", 8));
     s.relief = keys.number_or("relief", s.relief, 0, 0.9);
@@ -344,10 +356,8 @@ Node parse_holes(const json& body, const std::string& where, RecipeParser& parse
     if (keys.has("pattern"))
         p.pattern = parse_pattern(keys.value("pattern"), where + ".pattern");
     if (keys.has("height")) {
-        const json& h = keys.value("height");
-        if (!h.is_array() || h.size() != 2 || !h[0].is_number() || !h[1].is_number())
-            refuse(where, "'height' must be the shares at the bottom and at the top");
-        p.height = HeightShare{h[0].get<double>(), h[1].get<double>()};
+        const auto [bottom, top] = keys.pair("height", 0, 1);
+        p.height = HeightShare{bottom, top};
     }
     if (keys.has("where")) {
         const Keys file(keys.value("where"), where + ".where", {"file", "sha256"});

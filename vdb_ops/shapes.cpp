@@ -10,6 +10,7 @@
 #include "stats/core/rng.h"
 #include "stats/core/sphere.h"
 #include "stats/core/text.h"
+#include "stats/number_detail.h"
 #include "vdb_ops/balls_field.h"
 #include "vdb_ops/mesh_field.h"
 #include "vdb_ops/octant_mesh_detail.h"
@@ -26,9 +27,8 @@ constexpr std::uint32_t kNoiseStream = 0x626c6472;
 
 void check_range(const char* name, double value, double lo, double hi) {
     if (!(value >= lo && value <= hi))
-        throw Error(Fault::bad_argument, std::string("shape: ") + name + " is " +
-                                             std::to_string(value) + ", must be " +
-                                             std::to_string(lo) + ".." + std::to_string(hi) +
+        throw Error(Fault::bad_argument, std::string("shape: ") + name + " is " + shortest(value) +
+                                             ", must be " + shortest(lo) + ".." + shortest(hi) +
                                              "; choose a value in that range");
 }
 

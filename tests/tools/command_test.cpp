@@ -78,7 +78,10 @@ TEST(Command, ValuesOutOfRangeAreUsageErrors) {
     for (const char* command :
          {"taihu shape boulder --relief 5 -o a.ply", "taihu shape bolder -o a.ply",
           "taihu shape box --size -1 -o a.ply", "taihu shape sphere --dim 2 -o a.vdb",
-          "taihu shape box --size 1,2 -o a.ply", "taihu shape box --dim 64 -o a.ply"}) {
+          "taihu shape box --size 1,2 -o a.ply", "taihu shape box --dim 64 -o a.ply",
+          "taihu shape superquadric --exponents 3 -o a.ply",
+          "taihu shape superquadric --exponents 1,1,1 -o a.ply",
+          "taihu shape rounded_box --round 0.6 -o a.ply"}) {
         const Finished said = run(command, scratch.path());
         EXPECT_EQ(said.exit_code, 2) << command << said.err;
         EXPECT_EQ(lines(said.err), 1) << said.err;
@@ -150,6 +153,7 @@ TEST(Command, OptionsThatWouldDoNothingAreRefused) {
           "taihu carve a.vdb --holes h.csv --seed 3 -o b.vdb",
           "taihu carve a.vdb --holes h.csv --uniform -o b.vdb",
           "taihu mesh a.vdb --no-draco -o b.ply", "taihu mesh a.vdb --up z -o b.ply",
+          "taihu shape box --round 0.1 -o b.ply", "taihu shape ellipsoid --exponents 1 -o b.ply",
           "taihu shape boulder --seed -1 -o b.ply"}) {
         const Finished said = run(command, scratch.path());
         EXPECT_EQ(said.exit_code, 2) << command << said.err;

@@ -66,6 +66,18 @@ TEST(Verbs, FromMeasurementsToACertifiedRock) {
     EXPECT_EQ(result("taihu info rock.vdb", scratch)["recipe"]["solid"], info["recipe"]["solid"]);
 }
 
+TEST(Verbs, ShapeMakesAMeshAndALevelSetOfOneSolid) {
+    const Scratch scratch;
+    for (const std::string kind : {"rounded_box --round 15%", "capsule --size 0.5,1,0.5",
+                                   "torus --tube 20%", "superquadric --exponents 0.5,1.5"}) {
+        const json mesh = result("taihu shape " + kind + " -o a.ply", scratch);
+        result("taihu shape " + kind + " --dim 64 -o a.vdb", scratch);
+        const double solid = result("taihu measure a.vdb", scratch)["volume_m3"].get<double>();
+        // Meshes are inscribed; the tube of 32 sides lacks 2 (pi / 32)^2 / 3 of its volume.
+        EXPECT_NEAR(mesh["volume_m3"].get<double>(), solid, 0.01 * solid) << kind;
+    }
+}
+
 TEST(Verbs, TheThesisTablesAreThoseOfTheThesis) {
     const Scratch scratch;
     const Finished said = run("taihu fit " + kRock1 + " --method thesis", scratch.path());

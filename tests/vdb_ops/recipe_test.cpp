@@ -20,6 +20,14 @@ TEST(Recipe, IsWrittenInOneOrderAndShortestNumbers) {
               R"("porosity":0.25,"scale_m":0.1,"seed":7}}]}},"pieces":1,"bubbles":"fill"}}})");
 }
 
+TEST(Recipe, ShapesSayWhatTheyRead) {
+    EXPECT_EQ(shape_node({.kind = ShapeKind::rounded_box, .round_m = 0.1}),
+              R"({"rounded_box":{"size_m":[1.0,1.0,1.0],"round_m":0.1}})");
+    EXPECT_EQ(shape_node({.kind = ShapeKind::superquadric, .vertical = 0.5}),
+              R"({"superquadric":{"size_m":[1.0,1.0,1.0],"exponents":[0.5,1.0]}})");
+    EXPECT_EQ(shape_node({.kind = ShapeKind::capsule}), R"({"capsule":{"size_m":[1.0,1.0,1.0]}})");
+}
+
 TEST(Recipe, HolesSayHowTheyLie) {
     const auto node = [](const Pattern& pattern) {
         Placement placement;
