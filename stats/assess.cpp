@@ -98,6 +98,12 @@ void test_locations(const Measurements& m, const AssessSettings& settings, Asses
                 at.cells.reset();
             }
         }
+        if (!photo.masked)
+            a.findings.push_back(
+                printable(photo.name) + ": all of the photo counts as searched rock, " +
+                rounded(photo.window->area()) + " " + std::string(unit_name(m.sample.unit)) +
+                "^2; where it shows more than the rock, there are more holes "
+                "than this says, and they seem to crowd: give a mask.");
         a.findings.push_back(location_words(photo, at));
         a.locations.push_back(std::move(at));
     }
@@ -122,12 +128,13 @@ void count_holes(const Fit& fit, const SolidSize& solid, Assessment& a) {
     if (solid.area > 0)
         a.holes_biting = fit.n_v->estimate * solid.area * mean / 2;
     const double sd = std::sqrt(a.holes->estimate);
-    a.findings.push_back(
-        "Your rock has about " + rounded(a.holes->estimate) + " holes (" + rounded(a.holes->lo) +
-        " to " + rounded(a.holes->hi) + "), give or take " + rounded(sd, 2) + " by chance" +
-        (a.holes_biting ? ", and some " + rounded(*a.holes_biting, 2) +
-                              " more that are centred outside and bite its surface."
-                        : "."));
+    a.findings.push_back("Your rock has about " + rounded(a.holes->estimate, 2) + " holes (" +
+                         rounded(a.holes->lo, 2) + " to " + rounded(a.holes->hi, 2) +
+                         "; another rock of the same kind may differ by " + rounded(sd, 2) + ")" +
+                         (a.holes_biting
+                              ? ", and some " + rounded(*a.holes_biting, 2) +
+                                    " more that are centred outside and bite its surface."
+                              : "."));
 }
 
 void look_at_density(const Fit& fit, Assessment& a) {

@@ -7,6 +7,7 @@
 #include "stats/chi_squared.h"
 #include "stats/core/error.h"
 #include "stats/core/file.h"
+#include "stats/core/text.h"
 #include "stats/expect.h"
 #include "stats/io/law_file.h"
 #include "stats/thesis.h"
@@ -24,7 +25,8 @@ constexpr double kEmsShare = 0.1; // that EMS gives to each neighbouring class
 struct FitArgs {
     std::vector<std::filesystem::path> files;
     std::filesystem::path out, report, solid, expect;
-    std::string method = "ml", unfold = "em", counting = "centre", unit, scale_bar, expect_scale;
+    std::string method = "ml", unfold = "em", counting = "centre", unit, scale_bar, expect_scale,
+                limit;
     std::vector<std::string> masks, families;
     std::optional<double> volume, resolution, expect_density;
     MeasurementSettings settings;
@@ -99,9 +101,8 @@ void tell_ranking(const LawRanking& ranking, const std::string& per, const Conso
     if (ranking.fits.size() > 1)
         console.say("weights of the laws (Akaike): {}", line);
     if (ranking.fits.size() > 1 && ranking.n_v)
-        console.say("holes per {}^3 whichever the law: {:.4g} ({:.4g}..{:.4g}); the numbers of the "
-                    "laws differ from it by {:.4g}",
-                    per, ranking.n_v->mean, ranking.n_v->lo, ranking.n_v->hi, ranking.n_v->sd);
+        console.say("holes per {}^3 if no law is taken for granted: {:.4g} ({:.4g}..{:.4g})", per,
+                    ranking.n_v->mean, ranking.n_v->lo, ranking.n_v->hi);
     for (const std::string& note : ranking.notes)
         console.say_text(note);
 }
@@ -143,7 +144,16 @@ Measurements read(FitArgs& args) {
         args.settings.masks.push_back(parse_mask(mask));
     if (args.counting == "whole")
         args.settings.counting = Counting::whole;
-    return read_measurements(args.files, args.settings);
+    // A number is in the unit of the lengths; a length with a unit needs them to be metres.
+    const auto plain = parse_number(args.limit);
+    if (!args.limit.empty())
+        args.settings.detection_limit = plain ? *plain : length_m("--detection-limit", args.limit);
+    Measurements measurements = read_measurements(args.files, args.settings);
+    if (!args.limit.empty() && !plain && measurements.sample.unit != LengthUnit::metre)
+        throw Error(Fault::bad_argument, "--detection-limit: the lengths are in '" +
+                                             std::string(unit_name(measurements.sample.unit)) +
+                                             "'; give a number in that unit, or --scale-bar");
+    return measurements;
 }
 
 /// What lengths were rounded to: as said, or the coarsest pixel of the photos.
@@ -165,14 +175,14 @@ std::vector<Family> families_of(const FitArgs& args) {
 
 /// The rock whose holes are to be counted, in the unit of the sample.
 std::optional<SolidSize> solid_of(const FitArgs& args, LengthUnit unit, const Console& console) {
-    if (args.volume)
-        return SolidSize{*args.volume, 0};
-    if (args.solid.empty())
+    if (!args.volume && args.solid.empty())
         return std::nullopt;
     if (unit != LengthUnit::metre)
         throw Error(Fault::bad_argument,
-                    "--in: the lengths are in '" + std::string(unit_name(unit)) +
-                        "', a solid is in metres; give --scale-bar, or --volume in that unit");
+                    std::string(args.volume ? "--volume" : "--in") + ": the lengths are in '" +
+                        std::string(unit_name(unit)) + "', a rock is in metres; give --scale-bar");
+    if (args.volume)
+        return SolidSize{*args.volume, 0};
     SolidOptions options;
     options.path = args.solid;
     const Solid solid = read_solid(options, console);
@@ -223,7 +233,9 @@ std::string format_report(const FitArgs& args, const Measurements& measurements,
 }
 
 /// Whether the sample obeys the law of a file. Returns the keys of the JSON result.
-nlohmann::ordered_json judge(const FitArgs& args, const Sample& sample, const Console& console) {
+nlohmann::ordered_json judge(const FitArgs& args, const Measurements& measurements,
+                             const Console& console) {
+    const Sample& sample = measurements.sample;
     const LawFile asked = read_law_file(args.expect);
     double scale = 1;
     if (!args.expect_scale.empty()) {
@@ -240,7 +252,7 @@ nlohmann::ordered_json judge(const FitArgs& args, const Sample& sample, const Co
     std::optional<double> n_v = args.expect_density;
     if (!n_v && asked.n_v)
         n_v = asked.n_v->estimate / (scale * scale * scale);
-    const Expectation e = expect_law(sample, scaled(asked.law, scale), n_v,
+    const Expectation e = expect_law(sample, scaled(asked.law, scale), n_v, measurements.shared,
                                      {args.assess.n_resamples, args.assess.seed}, console.progress);
     const GoodnessTest& sizes = e.sizes.anderson_darling;
     console.say("sizes against {}: Anderson-Darling {:.3g}, p {:.3f}", args.expect.string(),
@@ -256,7 +268,14 @@ nlohmann::ordered_json judge(const FitArgs& args, const Sample& sample, const Co
         console.say_text("number of profiles: not judged; it takes the area searched, and the "
                          "law's n_v or --expect-density");
     }
-    console.say("the profiles {} the law asked for", e.obeys ? "obey" : "do not obey");
+    if (e.number && e.number->shared > 0.3)
+        console.say_text("many holes were cut by several planes: a no to their sizes is less sure; "
+                         "cut with fewer planes");
+    console.say("the profiles {} the law asked for (together the tests reject one true law in 20)",
+                e.obeys ? "obey" : "do not obey");
+    if (!e.obeys && measurements.shared)
+        console.say_text("of a carved rock: were bubbles filled (carve --bubbles keep), and did "
+                         "section know the --holes and the --base");
     return json;
 }
 
@@ -309,7 +328,7 @@ void run(FitArgs& args, const Console& console) {
     auto json = nlohmann::ordered_json::parse(law);
     if (args.expect.empty())
         return console.result(json);
-    auto verdict = judge(args, sample, console);
+    auto verdict = judge(args, measurements, console);
     const bool obeys = verdict["obeys"];
     verdict["law"] = std::move(json);
     console.result(verdict);
@@ -339,8 +358,8 @@ void add_photo_options(CLI::App& verb, FitArgs& args) {
         "those wholly inside)")
         ->check(CLI::IsMember({"centre", "whole"}))
         ->capture_default_str();
-    add("--detection-limit", args.settings.detection_limit,
-        "Nothing smaller was marked [unit; the smallest marked]");
+    add("--detection-limit", args.limit,
+        "Nothing smaller was marked: 8mm, or a number in the unit [the smallest marked]");
     add("--resolution", args.resolution,
         "Lengths are rounded to this [unit; a pixel of the photo]");
 }
@@ -375,7 +394,7 @@ void add_count_options(CLI::App& verb, FitArgs& args) {
         return verb.add_option(name, value, what)->group("What it is for");
     };
     auto* solid = add("--in", args.solid, "Count the holes of this rock (.vdb or a mesh, metres)");
-    add("--volume", args.volume, "or of a rock of this volume [unit^3]")->excludes(solid);
+    add("--volume", args.volume, "or of a rock of this volume [m^3]")->excludes(solid);
     auto* expect =
         add("--expect", args.expect, "Say whether the profiles obey this law (exit 3 if not)");
     add("--expect-scale", args.expect_scale, "Length of one unit of that law [its own unit]")

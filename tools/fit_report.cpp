@@ -46,9 +46,13 @@ std::string html(std::string_view text) {
     return safe;
 }
 
-/// `290 (202–420)`.
+/// `290 (200–420)`: no more digits than a range so wide can have.
+std::string between(double estimate, double lo, double hi) {
+    return rounded(estimate, 2) + " (" + rounded(lo, 2) + "–" + rounded(hi, 2) + ")";
+}
+
 std::string between(const NumberDensity& n) {
-    return rounded(n.estimate) + " (" + rounded(n.lo) + "–" + rounded(n.hi) + ")";
+    return between(n.estimate, n.lo, n.hi);
 }
 
 /// The number, and the word in the form that it asks for.
@@ -149,7 +153,11 @@ std::string laws_table(const FitReport& r, const DisplayUnit& unit) {
             rounded(f.law.mean() * unit.factor), unit.name, f.n_v ? between(*f.n_v) : "–",
             f.n_v ? rounded(100 * f.n_v->extrapolated_share, 2) + " %" : "–");
     }
-    return text + "</table>\n";
+    text += "</table>\n";
+    if (const auto& all = r.ranking.n_v; all && r.ranking.fits.size() > 1)
+        text += "<p>Taking no law for granted there are " + between(all->mean, all->lo, all->hi) +
+                " holes in a " + unit.cube + ".</p>\n";
+    return text;
 }
 
 std::string list(const std::string& title, const std::vector<std::string>& items) {

@@ -11,6 +11,7 @@
 #include "stats/core/rng.h"
 #include "stats/number_detail.h"
 #include "vdb_ops/plane_image_detail.h"
+#include "vdb_ops/volume.h"
 
 namespace taihu {
 namespace {
@@ -188,6 +189,7 @@ Section section(const openvdb::FloatGrid& solid, const SectionKnown& known,
         result.area_m2 += page.plane.area_m2;
         result.n_small += page.n_small;
     }
+    result.volume_m3 = volume_m3(known.base ? *known.base : solid);
     return result;
 }
 
@@ -200,6 +202,8 @@ std::string format_profiles(const Section& section, bool major) {
         text += "# plane " + std::to_string(i) + " through " + point(section.planes[i].origin) +
                 ", normal " + point(section.planes[i].normal) + ", u along " +
                 point(section.planes[i].u) + '\n';
+    text += "# planes=" + std::to_string(section.planes.size()) +
+            "\n# volume_m3=" + shortest(section.volume_m3) + '\n';
     text += "# area_m2=" + shortest(section.area_m2) + "\nplane,u_m,v_m,diameter_m\n";
     for (const Profile& p : section.profiles)
         text += std::to_string(p.plane) + ',' + shortest(p.u_m) + ',' + shortest(p.v_m) + ',' +

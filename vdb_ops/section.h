@@ -49,6 +49,7 @@ struct Section {
     std::vector<SectionPlane> planes;
     std::vector<Profile> profiles; ///< by plane; in the order of the holes, or of their first pixel
     double area_m2 = 0;            ///< of all planes
+    double volume_m3 = 0;          ///< of the base, or of the solid
     double resolution_m = 0;       ///< smaller profiles are left out; 0 with a list of holes
     std::uint64_t n_small = 0;     ///< how many were
 };
@@ -71,7 +72,7 @@ struct Section {
 Section section(const openvdb::FloatGrid& solid, const SectionKnown& known = {},
                 const SectionSettings& settings = {}, Progress* progress = nullptr);
 
-/// `profiles.csv`: the planes as comments, `# area_m2=`, then plane,u_m,v_m,diameter_m.
+/// `profiles.csv`: the planes as comments, `# planes=`, `# volume_m3=`, `# area_m2=`, then plane,u_m,v_m,diameter_m.
 /// \param major  the major axis in place of the equivalent diameter.
 std::string format_profiles(const Section& section, bool major = false);
 

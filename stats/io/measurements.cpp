@@ -80,6 +80,7 @@ struct Part {
     std::optional<Annotations> annotations; ///< of segments
     std::optional<LengthUnit> unit;
     std::optional<double> area;
+    std::optional<double> planes, volume; ///< of a table of sections
 };
 
 const Format& recognise(const Table& table) {
@@ -123,6 +124,12 @@ void read_comments(const Table& table, Part& part, std::vector<std::string>& war
                 table.refuse_line(comment.line, "'" + key + "' is '" + printable(comment.value) +
                                                     "'; must be a number > 0");
             part.area = area;
+        } else if (part.kind == Kind::profiles && (key == "planes" || key == "volume_m3")) {
+            const auto value = table.parse(comment.value);
+            if (!value || !(*value > 0))
+                table.refuse_line(comment.line, "'" + key + "' is '" + printable(comment.value) +
+                                                    "'; must be a number > 0");
+            (key == "planes" ? part.planes : part.volume) = value;
         } else if (!key.empty() && !did_you_mean(key, known).empty()) {
             warnings.push_back(part.name + ":" + std::to_string(comment.line) + ": comment '" +
                                printable(key) + "' is not read" + did_you_mean(key, known));
@@ -284,6 +291,12 @@ Part read_part(const std::filesystem::path& path, const MeasurementSettings& set
         text.remove_prefix(3);
     const std::size_t first = text.find_first_not_of(" \t\r\n");
     const char begin = first == std::string_view::npos ? '\0' : text[first];
+    if (text.empty())
+        throw Error(Fault::bad_input, part.name + ": is empty; save the marks again");
+    if (text.starts_with("\x89PNG") || text.starts_with("\xff\xd8\xff") ||
+        text.starts_with("II*") || text.starts_with("MM"))
+        throw Error(Fault::bad_input, part.name + ": is a picture; give the file of the marks on "
+                                                  "it, as labelme's .json");
     if (is_imagej_roi(text)) {
         part.annotations = read_imagej_roi(text, part.name);
     } else if (is_zip(text)) {
@@ -399,6 +412,7 @@ void straighten_area(const std::optional<double>& area_factor, Measurements& res
 void add_windows(const std::vector<std::optional<Image>>& masks, Measurements& result) {
     for (std::size_t i = 0; i < result.photos.size(); ++i) {
         Photo& photo = result.photos[i];
+        photo.masked = masks[i].has_value();
         if (masks[i])
             photo.window = Window::mask(*masks[i], photo.unit_per_px);
         else if (photo.width_px > 0)
@@ -474,6 +488,9 @@ Measurements read_measurements(std::span<const std::filesystem::path> paths,
     std::vector<Part> parts;
     for (const std::filesystem::path& path : paths)
         parts.push_back(read_part(path, settings, result));
+    if (parts.size() == 1 && parts.front().planes && parts.front().volume)
+        result.shared =
+            SharedHoles{static_cast<std::size_t>(*parts.front().planes), *parts.front().volume};
     const auto masks = join_segments(parts, settings, result);
     for (std::size_t i = 0; i < parts.size(); ++i)
         join(parts[i], i == 0, result);
@@ -483,8 +500,12 @@ Measurements read_measurements(std::span<const std::filesystem::path> paths,
     result.sample.counting = settings.counting;
     const std::uint64_t n = n_profiles(result.sample);
     if (n < kFewestProfiles)
-        throw Error(Fault::bad_input, result.sources.back().name + ": " + std::to_string(n) +
-                                          " profiles; at least 8 are needed, mark more holes");
+        throw Error(Fault::bad_input,
+                    result.sources.back().name + ": " + std::to_string(n) +
+                        " profiles; at least 8 are needed, mark more holes" +
+                        (settings.masks.empty()
+                             ? ""
+                             : ", or see whether the masks are bright where was searched"));
     scale_to_greatest(result);
     add_windows(masks, result);
     straighten_area(settings.area_factor, result);

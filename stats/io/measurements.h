@@ -39,6 +39,7 @@ struct Photo {
     std::string name;                ///< as the file says it; the file's own name where it does not
     int width_px = 0, height_px = 0; ///< 0: not known
     double unit_per_px = 1;          ///< of the sample's unit
+    bool masked = false;             ///< a mask says which part was searched
     std::optional<Window> window; ///< the part that was searched, where the size or a mask is known
 };
 
@@ -60,10 +61,17 @@ struct SourceFile {
     friend bool operator==(const SourceFile&, const SourceFile&) = default;
 };
 
+/// Planes that cut the same rock: a large hole shows on several of them.
+struct SharedHoles {
+    std::size_t n_planes = 1;
+    double volume = 0; ///< of the rock [unit^3], > 0
+};
+
 struct Measurements {
     Sample sample; ///< passes check_sample; one frame a photo, when each has a window
-    std::vector<Segment> segments; ///< when segments were read; in the order of the files
-    std::vector<Photo> photos;     ///< that the segments lie on, in the order of the files
+    std::vector<Segment> segments;     ///< when segments were read; in the order of the files
+    std::optional<SharedHoles> shared; ///< when all of it is one table of `taihu section`
+    std::vector<Photo> photos;         ///< that the segments lie on, in the order of the files
     std::vector<SourceFile> sources;
     std::vector<std::string> warnings; ///< `file:line: what`, worth showing to people
 };
@@ -76,7 +84,8 @@ struct Measurements {
 /// - `diameter_lo,diameter_hi,count`: counts in bins that touch; empty bins have the count 0.
 /// - `image,label,x1,y1,x2,y2,unit_per_px` and perhaps `minor`, and `width_px,height_px` of the
 ///   image: segments in pixels. An empty unit_per_px means: not known.
-/// - `plane,u_m,v_m,diameter_m` with `# area_m2=`: what `taihu section` writes, in metres.
+/// - `plane,u_m,v_m,diameter_m` with `# area_m2=`, and perhaps `# planes=`, `# volume_m3=`: what
+///   `taihu section` writes, in metres.
 ///
 /// Chinese column names: 直径 diameter, 直径下限 diameter_lo, 直径上限 diameter_hi, 数量 个数
 /// count, 图像 图片 照片 image, 标签 类别 label, 起点x 起点y 终点x 终点y x1 y1 x2 y2 (also X, Y),

@@ -18,7 +18,7 @@ using testing::HasSubstr;
 // A photo of 4 m x 3 m with 60 holes of mean 0.1 m, by default anywhere on it.
 Measurements photo(double width = 4) {
     Measurements m;
-    m.photos.push_back({"stone.jpg", 400, 300, 0.01, Window::rectangle(4, 3)});
+    m.photos.push_back({"stone.jpg", 400, 300, 0.01, false, Window::rectangle(4, 3)});
     const SectionDraws draws(Law::exponential(10), 0.02);
     const Rng rng{3, 9};
     for (std::uint64_t i = 0; i < 60; ++i) {
@@ -51,6 +51,7 @@ TEST(Assess, GoodDataRaiseNoAlarm) {
     EXPECT_EQ(a.locations[0].cells->ny, 2);
     EXPECT_THAT(a.findings, Contains(HasSubstr("look like sections of exponential holes")));
     EXPECT_THAT(a.findings, Contains(HasSubstr("as if thrown at random")));
+    EXPECT_THAT(a.findings, Contains(HasSubstr("counts as searched rock, 12 m^2")));
     EXPECT_FALSE(a.holes);
     EXPECT_FALSE(a.curvature);
 }

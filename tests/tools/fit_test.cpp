@@ -66,7 +66,8 @@ TEST(Fit, OneCommandTurnsAPhotoIntoLawCountAndPage) {
     const double expected = law["n_v"]["estimate"].get<double>() * M_PI / 6;
     const auto at = said.err.find("Your rock has about ");
     ASSERT_NE(at, std::string::npos) << said.err;
-    EXPECT_NEAR(std::atof(said.err.c_str() + at + 20), expected, 0.02 * expected);
+    // Two digits, and the voxels of the ball.
+    EXPECT_NEAR(std::atof(said.err.c_str() + at + 20), expected, 0.07 * expected);
     const std::string page = read_file(folder / "r.html");
     for (const char* part : {"What this says", "What was marked", "Which law", "<svg",
                              "Where the holes lie", "What to do better next time", "SHA-256"})

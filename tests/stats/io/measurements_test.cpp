@@ -213,7 +213,7 @@ TEST(Measurements, SayWhatOtherFilesLack) {
                 HasSubstr("is the list of ImageJ's ROI Manager, which has no ends"));
     EXPECT_THAT(refusal({"{\"images\":[],\"annotations\":[]}"}),
                 HasSubstr("neither of labelme nor of VIA"));
-    EXPECT_THAT(refusal({""}), HasSubstr("has no header line"));
+    EXPECT_THAT(refusal({""}), HasSubstr("is empty"));
 }
 
 TEST(Measurements, CheckTheSettings) {
