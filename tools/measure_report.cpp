@@ -22,8 +22,8 @@ std::string estimate_text(const Estimate& e) {
 
 Json chords_json(const ChordLengths& chords) {
     Json quantiles = Json::array();
-    for (std::size_t q = 0; q < kShares.size(); ++q)
-        quantiles.push_back({kShares[q], optional_json(chords.quantiles_m[q])});
+    for (std::size_t q = 0; q < kQuantiles.size(); ++q)
+        quantiles.push_back({kQuantiles[q], optional_json(chords.quantiles_m[q])});
     return {{"n", chords.n},
             {"mean_m", estimate_json(chords.mean_m)},
             {"quantiles_m", quantiles},
@@ -34,8 +34,8 @@ Json diameters_json(const std::optional<BallDiameters>& balls) {
     if (!balls)
         return nullptr;
     Json quantiles = Json::array();
-    for (std::size_t q = 0; q < kShares.size(); ++q)
-        quantiles.push_back({kShares[q], balls->quantiles_m[q]});
+    for (std::size_t q = 0; q < kQuantiles.size(); ++q)
+        quantiles.push_back({kQuantiles[q], balls->quantiles_m[q]});
     return {
         {"mean_m", balls->mean_m}, {"quantiles_m", quantiles}, {"greatest_m", balls->greatest_m}};
 }
@@ -169,8 +169,8 @@ void say_pores(const PoreMeasures& m, const std::string& where, const std::strin
     console.say("{}: holes inside {}, from {:.3g} m below its surface", where,
                 base.empty() ? "the solid with its enclosed voids filled" : base, m.margin_m);
     if (m.coarser > 1)
-        console.say("{}: too large for all its voxels: walls, pores and Euler numbers are from "
-                    "every {}th of them, {:.3g} m apart",
+        console.say("{}: too large for all its voxels: walls, pores and Euler numbers are taken at "
+                    "steps of {} voxels, {:.3g} m",
                     where, m.coarser, m.voxel_m);
     console.say("{}: porosity {}, hole surface {} m^2 per m^3 (of this solid +- {})", where,
                 estimate_text(m.porosity), estimate_text(m.s_v_m1), rounded(m.s_v_line_se_m1, 2));
@@ -208,8 +208,8 @@ void say_comparison(const PoreMeasures& measures, const Prediction& prediction,
 
 void say_tradition(const Tradition& t, const std::string& where, const Console& console) {
     const TraditionMeasures& m = t.fine;
-    console.say("{}: thin: fills {:.3g} of its hull and {:.3g} of its box, {:.3g} times as high as "
-                "wide, waist {:.3g}, walls {:.3g} of its size of {:.3g} m",
+    console.say("{}: thin: fills {:.3g} of its hull and {:.3g} of its box, slenderness {:.3g}, "
+                "waist {:.3g}, walls {:.3g} of its size of {:.3g} m",
                 where, m.body_in_hull, m.body_in_box, m.slenderness, m.waist, m.wall, m.size_m);
     console.say("{}: seen through: {:.3g} of its outline is open, {:.3g} windows a view, {:.0f} of "
                 "{} views have one, the widest {:.3g} m",
@@ -231,8 +231,8 @@ void say_tradition(const Tradition& t, const std::string& where, const Console& 
                 "off it; curvature {:.3g} (a ball has 2), {:.3g} concave",
                 where, m.area_ratio, m.roughness, m.curvature, m.concave_share);
     const std::string differ = unsettled(t);
-    console.say("{}: voxel {:.3g} m{}; {}", where, t.voxel_m,
-                t.coarser > 1 ? fmt::format(", every {}th of the solid's", t.coarser) : "",
+    console.say("{}: measured at steps of {} voxel{}, {:.3g} m; {}", where, t.coarser,
+                t.coarser > 1 ? "s" : "", t.voxel_m,
                 differ.empty() ? "at half the resolution all is within 5 %"
                                : "at half the resolution off by more than 5 %: " + differ);
 }

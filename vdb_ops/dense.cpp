@@ -1,5 +1,6 @@
 #include "vdb_ops/dense_detail.h"
 
+#include <array>
 #include <string>
 
 #include <openvdb/tools/Interpolation.h>

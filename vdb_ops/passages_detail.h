@@ -7,12 +7,14 @@
 
 namespace taihu {
 
-/// The ways through a solid. The outline is the solid with enclosed_voids() filled.
+/// The ways through a solid. Its outline is what a large ball, rolled round it, does not reach.
 class Passages {
 public:
-    /// \param distances  signed_distances() of the solid, far outside along the sides of the
-    /// lattice
-    Passages(const DenseLattice& lattice, std::span<const float> distances, Progress* progress);
+    /// \param distances  signed_distances() of the solid, at least `outline_radius` along the sides
+    /// of the lattice; both must outlive this
+    /// \param outline_radius  of the large ball [samples]
+    Passages(const DenseLattice& lattice, std::span<const float> distances, float outline_radius,
+             const Progress* progress);
 
     /// What a ball finds that comes from outside.
     struct Opened {
@@ -29,18 +31,20 @@ public:
     };
     Sealed sealed() const;
 
-    /// Diameter of the largest ball that rolls, inside the outline, from a mouth in the upper
-    /// quarter of the solid to one in the lower quarter; 0 when there is no way [samples].
+    /// Diameter of the largest ball that rolls, all of it inside the outline, from a mouth that it
+    /// reaches in the upper quarter of the solid to one in the lower; 0 when none of two samples
+    /// does [samples].
     double channel(const Progress* progress) const;
 
 private:
     std::vector<std::uint8_t> centres(float radius) const;
-    std::vector<float> widths() const;
-    bool leads_through(std::span<const std::uint8_t> wide, bool over_corners) const;
+    std::vector<float> beyond(const std::vector<std::uint8_t>& centres, float radius,
+                              const Progress* progress) const;
+    bool leads_through(std::span<const std::uint8_t> wide, float radius) const;
 
     const DenseLattice& lattice_;
     std::span<const float> distances_;
-    std::vector<std::uint8_t> enclosed_;
+    std::vector<float> depth_;    // below the outline, negative outside
     double n_outline_ = 0;        // samples
     int y_low_ = 0, y_high_ = -1; // of the solid
 };

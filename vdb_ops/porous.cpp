@@ -171,8 +171,8 @@ ChordLengths chord_lengths(const LineSums& sums, const LineSums::Chords& chords,
             }
         return std::nullopt;
     };
-    for (std::size_t q = 0; q < kShares.size(); ++q)
-        result.quantiles_m[q] = length_at(kShares[q]);
+    for (std::size_t q = 0; q < kQuantiles.size(); ++q)
+        result.quantiles_m[q] = length_at(kQuantiles[q]);
     const double last = static_cast<double>(survival.size() - 1);
     const double longest = length_at(0.99).value_or(last * sums.bin_m) / sums.bin_m;
     result.bin_m = longest * sums.bin_m / static_cast<double>(result.shares.size());
@@ -230,7 +230,7 @@ std::optional<BallDiameters> diameters(const SizeCounts& counts, double voxel_m)
     std::size_t q = 0;
     for (const auto& [diameter, count] : counts) {
         below += static_cast<double>(count);
-        for (; q < kShares.size() && below >= kShares[q] * n; ++q)
+        for (; q < kQuantiles.size() && below >= kQuantiles[q] * n; ++q)
             result.quantiles_m[q] = static_cast<double>(diameter) * voxel_m;
     }
     return result;

@@ -23,13 +23,14 @@ struct Estimate {
     std::optional<double> se;
 };
 
-inline constexpr std::array<double, 5> kShares = {0.05, 0.25, 0.5, 0.75, 0.95};
+/// Of the quantiles below: the share that is smaller.
+inline constexpr std::array<double, 5> kQuantiles = {0.05, 0.25, 0.5, 0.75, 0.95};
 
 /// Lengths of the stretches that random lines have in solid or in holes.
 struct ChordLengths {
     std::optional<Estimate> mean_m;                   ///< nothing when no line crosses a surface
-    std::array<std::optional<double>, 5> quantiles_m; ///< of kShares; nothing when chords that
-                                                      ///< leave the region are all that is so long
+    std::array<std::optional<double>, 5> quantiles_m; ///< nothing where all chords so long leave
+                                                      ///< the region
     double bin_m = 0;
     std::array<double, 20> shares{}; ///< of chords in 20 bins from 0; the rest is longer or unknown
     std::uint64_t n = 0;             ///< that were seen from end to end
@@ -38,14 +39,13 @@ struct ChordLengths {
 /// Diameters of the greatest balls inside that contain a point, for points all over the volume.
 struct BallDiameters {
     double mean_m = 0;
-    std::array<double, 5> quantiles_m{}; ///< of kShares
+    std::array<double, 5> quantiles_m{};
     double greatest_m = 0;
 };
 
 struct CorrelationPoint {
     double distance_m = 0;
-    std::optional<Estimate>
-        both; ///< share of pairs, both ends inside the region, that lie in holes
+    std::optional<Estimate> both; ///< share of the pairs inside the region that lie in holes
 };
 
 struct PoreMeasures {
@@ -68,14 +68,16 @@ struct PoreMeasures {
 ///
 /// Lines are isotropic and uniform. Surface per volume is twice the crossings per length; mean
 /// chords are lengths over numbers, without edge effect; quantiles of chords are those of Kaplan
-/// and Meier, for whom a chord that leaves the region is one of at least that length. Chords below
-/// a tenth of a voxel may be missed. Balls: low by up to a voxel in rods and round holes. The same
-/// on any number of threads. Time O(lines + voxels), 24 bytes a lattice voxel. \param base  the
-/// solid before holes were cut; nothing: the solid with its voids filled where a
-///              plane along the lattice, in one of its three directions, shows them enclosed.
-/// \throws Error bad_argument: a setting, or as lattice_of(); bad_input: the solid or base is
-/// empty,
-///   the base has nothing deeper than a voxel, or the box is too large; cancelled.
+/// and Meier, for whom a chord that leaves the region is one of at least that length. Ridges
+/// between holes are rounded by the voxels: 2 % of the surface of holes ten voxels wide is lost,
+/// and chords below two voxels are too few. Diameters are low by up to a voxel in rods and round
+/// holes. The same on any number of threads. Time O(lines + voxels), 24 bytes a lattice voxel.
+///
+/// \param base  the solid before holes were cut; nothing: the solid with its voids filled where a
+/// plane along the lattice, in one of its three directions, shows them enclosed.
+/// \throws Error bad_argument: a setting, or as lattice_of(); bad_input: the solid or the base is
+/// empty, the base has nothing deeper than a voxel, or the box is too large; cancelled.
+///
 /// Source: textbook stereology, Kaplan & Meier 1958, Hildebrand & Ruegsegger 1997, all from memory;
 /// checked on solids whose numbers are known.
 PoreMeasures measure_pores(const openvdb::FloatGrid& solid,

@@ -86,7 +86,8 @@ void measure_body(const DenseLattice& lattice, std::span<const float> distances,
 void measure_passages(const DenseLattice& lattice, std::span<const float> distances, double size_m,
                       TraditionMeasures& m, Progress* progress) {
     report_stage(progress, "passages");
-    const Passages passages(lattice, distances, progress);
+    const double outline_radius = 0.5 * kOutlineBallShare * size_m / lattice.voxel_m;
+    const Passages passages(lattice, distances, static_cast<float>(outline_radius), progress);
     for (std::size_t k = 0; k < kBallShares.size(); ++k) {
         const double radius = 0.5 * kBallShares[k] * size_m / lattice.voxel_m;
         const Passages::Opened opened = passages.opened(static_cast<float>(radius), progress);
@@ -155,8 +156,9 @@ Tradition measure_tradition(const openvdb::FloatGrid& solid, double hull_m3, Pro
                     "tradition: hull_m3 is " + shortest(hull_m3) + "; must be finite and > 0");
     const openvdb::CoordBBox box = inside_voxels(solid, "tradition");
     const double size_m = std::cbrt(6 / std::numbers::pi * volume_m3(solid));
-    // Air for the kernel of the smoothing.
-    const double margin = 3 * kSmoothingShare * size_m / lattice_of(solid).voxel_m;
+    // Air for the kernel of the smoothing and for the ball that rolls round the solid.
+    const double margin =
+        std::max(3 * kSmoothingShare, 0.5 * kOutlineBallShare) * size_m / lattice_of(solid).voxel_m;
     Tradition result;
     const DenseLattice fine = dense_lattice(solid, box, margin, 1, "tradition");
     const DenseLattice coarse = dense_lattice(solid, box, margin, 2 * fine.coarser, "tradition");

@@ -13,11 +13,12 @@ inline constexpr int kViews = 32;
 /// Balls sent in from outside, diameter / size of the solid; 0 stands for anything that finds a way
 /// over the faces of voxels.
 inline constexpr std::array<double, 4> kBallShares = {0, 0.02, 0.04, 0.08};
-inline constexpr double kSmoothingShare = 0.02; ///< sd of the smoothing / size
+inline constexpr double kOutlineBallShare = 0.5; ///< diameter of the ball of the outline / size
+inline constexpr double kSmoothingShare = 0.02;  ///< sd of the smoothing / size
 
 /// What a garden rock was praised for, as numbers: thin, seen through, leaky, wrinkled. `size` is
-/// the diameter of the ball of the same volume; +Y is up. The outline is the solid with its voids
-/// filled where a plane along the lattice, in one of its three directions, shows them enclosed.
+/// the diameter of the ball of the same volume; +Y is up. The outline is what a ball of half that
+/// size, rolled round the solid, does not reach.
 struct TraditionMeasures {
     double volume_m3 = 0, size_m = 0, height_m = 0;
     // Thin
@@ -35,7 +36,8 @@ struct TraditionMeasures {
     std::array<double, 4> ways{};          ///< different ones of each ball through the solid
     std::array<double, 4> open_porosity{}; ///< volume of the outline that each ball sweeps / volume
     double channel_m = 0; ///< diameter of the largest ball that rolls, inside the outline, from a
-                          ///< mouth in the upper quarter to one in the lower; 0: none
+                          ///< mouth in the upper quarter of the height to one in the lower; 0: none
+                          ///< of two voxels
     double sealed_voids = 0;    ///< number of voids without a way out
     double sealed_porosity = 0; ///< their volume / volume of the outline
     // Wrinkled
@@ -56,11 +58,12 @@ struct Tradition {
 bool agree(double fine, double coarse);
 
 /// Measure a solid on a lattice of at most 2^25 of its voxels, and on one of half the resolution.
-/// The same on any number of threads. About 3 s for a million voxels in its box on one core, 24
-/// bytes a lattice voxel.
+/// The same on any number of threads. About a second of processor time for a million samples,
+/// 24 bytes a sample.
+///
 /// \param hull_m3  volume of its convex hull, > 0
 /// \throws Error bad_argument: hull_m3, or as lattice_of(); bad_input: the solid is empty, thinner
-///   than two voxels everywhere, or its box is too large; cancelled.
+/// than two voxels everywhere, or its box is too large; cancelled.
 Tradition measure_tradition(const openvdb::FloatGrid& solid, double hull_m3,
                             Progress* progress = nullptr);
 

@@ -16,16 +16,15 @@ namespace {
 class View {
 public:
     View(const DenseLattice& lattice, std::span<const float> distances, double azimuth)
-        : lattice_(lattice),
-          distances_(distances), along_{std::cos(azimuth), 0, std::sin(azimuth)}, side_{-along_.z,
-                                                                                        0,
-                                                                                        along_.x},
-          half_(0.5 *
-                (std::abs(side_.x) * (lattice.n[0] - 1) + std::abs(side_.z) * (lattice.n[2] - 1))) {
+        : lattice_(lattice), distances_(distances) {
+        along_ = Vec3{std::cos(azimuth), 0, std::sin(azimuth)};
+        side_ = Vec3{-along_.z, 0, along_.x};
+        const double half =
+            0.5 * (std::abs(side_.x) * (lattice.n[0] - 1) + std::abs(side_.z) * (lattice.n[2] - 1));
         // Windows are what is enclosed in the one plane of this lattice.
         picture_.n[0] = 1;
         picture_.n[1] = lattice.n[1];
-        picture_.n[2] = 2 * static_cast<int>(std::ceil(half_)) + 1;
+        picture_.n[2] = 2 * static_cast<int>(std::ceil(half)) + 1;
         std::vector<float> seen(picture_.size());
         for (int y = 0; y < picture_.n[1]; ++y)
             for (int i = 0; i < picture_.n[2]; ++i)
@@ -122,7 +121,6 @@ private:
     const DenseLattice& lattice_;
     std::span<const float> distances_;
     Vec3 along_, side_;
-    double half_;
     DenseLattice picture_;
     std::vector<std::uint8_t> windows_;
     std::size_t n_open_ = 0, n_outline_ = 0;

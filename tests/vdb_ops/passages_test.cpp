@@ -13,7 +13,8 @@ namespace {
 
 constexpr double kPi = std::numbers::pi;
 const Vec3 kCenter{31.6, 32.3, 31.8};
-constexpr double kSide = 40;
+constexpr double kSide = 32;
+constexpr float kLarge = 14; // of the ball that finds the outline
 
 /// A cube with a round hole from top to bottom, of radius r at its ends and `neck` in the middle.
 double drilled(const Vec3& p, double r, double neck) {
@@ -23,14 +24,21 @@ double drilled(const Vec3& p, double r, double neck) {
     return std::max(box_distance(d, {kSide / 2, kSide / 2, kSide / 2}), -std::min(wide, narrow));
 }
 
+/// What a ball on a round mouth has beyond it.
+double cap(double ball, double mouth) {
+    const double deep = ball - std::sqrt(ball * ball - mouth * mouth);
+    return kPi / 3 * deep * deep * (3 * ball - deep);
+}
+
 TEST(Passages, AHoleFromTopToBottomIsOneWayAndAChannel) {
     const double r = 6.4;
     const DenseLattice lattice = cube_lattice(64);
     const auto d = distances(lattice, [&](const Vec3& p) { return drilled(p, r, r); });
-    const Passages passages(lattice, d, nullptr);
+    const Passages passages(lattice, d, kLarge, nullptr);
     // A quarter of a sample off the axis, and as much as crossings lie beside the nearest point.
     EXPECT_NEAR(passages.channel(nullptr), 2 * r, 0.6);
-    const double share = kPi * r * r / (kSide * kSide);
+    const double mouths = 2 * cap(kLarge, r), volume = std::pow(kSide, 3) - mouths;
+    const double share = (kPi * r * r * kSide - mouths) / volume;
     for (const float radius : {0.f, 2.f, 5.f}) {
         const Passages::Opened opened = passages.opened(radius, nullptr);
         EXPECT_EQ(opened.n_ways, 1) << radius;
@@ -43,17 +51,16 @@ TEST(Passages, AHoleFromTopToBottomIsOneWayAndAChannel) {
 TEST(Passages, ANeckIsTheWidthOfTheChannel) {
     const DenseLattice lattice = cube_lattice(64);
     const auto d = distances(lattice, [&](const Vec3& p) { return drilled(p, 8, 3.6); });
-    const Passages passages(lattice, d, nullptr);
+    const Passages passages(lattice, d, kLarge, nullptr);
     EXPECT_NEAR(passages.channel(nullptr), 7.2, 0.6);
     EXPECT_EQ(passages.opened(3, nullptr).n_ways, 1);
     EXPECT_EQ(passages.opened(4.2f, nullptr).n_ways, 0);
-    // A ball that does not pass sweeps the two wide ends, 14 deep, but for their edges, (1 - pi /
-    // 4) of its radius squared with the centroid 0.223 radii off, and a cap of the neck, 1.5 deep.
-    const double ball = 5, ends = kPi * 8 * 8 * 14,
-                 edges = 2 * kPi * (8 - 0.223 * ball) * (1 - kPi / 4) * ball * ball,
-                 deep = ball - std::sqrt(ball * ball - 3.6 * 3.6),
-                 cap = kPi / 3 * deep * deep * (3 * ball - deep);
-    const double share = 2 * (ends - edges + cap) / std::pow(kSide, 3);
+    // A ball that does not pass sweeps the two wide ends, 10 deep, but for their edges, (1 - pi /
+    // 4) of its radius squared with the centroid 0.223 radii off, and what it reaches of the neck.
+    const double ball = 5, ends = kPi * 8 * 8 * 10,
+                 edges = 2 * kPi * (8 - 0.223 * ball) * (1 - kPi / 4) * ball * ball;
+    const double mouths = 2 * cap(kLarge, 8), volume = std::pow(kSide, 3) - mouths;
+    const double share = (2 * (ends - edges + cap(ball, 3.6)) - mouths) / volume;
     EXPECT_NEAR(passages.opened(5, nullptr).open_share, share, 0.05 * share);
 }
 
@@ -61,11 +68,11 @@ TEST(Passages, ABubbleIsSealed) {
     const DenseLattice lattice = cube_lattice(64);
     const auto d = distances(lattice, [](const Vec3& p) {
         const double r = length(p - kCenter);
-        return std::max(r - 24, 9 - r);
+        return std::max(r - 16, 6 - r);
     });
-    const Passages passages(lattice, d, nullptr);
+    const Passages passages(lattice, d, kLarge, nullptr);
     EXPECT_EQ(passages.sealed().n, 1u);
-    EXPECT_NEAR(passages.sealed().share, std::pow(9 / 24., 3), 0.002);
+    EXPECT_NEAR(passages.sealed().share, std::pow(6 / 16., 3), 0.002);
     EXPECT_EQ(passages.opened(0, nullptr).open_share, 0);
     EXPECT_EQ(passages.channel(nullptr), 0);
 }

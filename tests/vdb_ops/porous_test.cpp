@@ -38,8 +38,8 @@ TEST(Pores, OneHoleHasItsSurfaceChordsAndCorrelation) {
     ASSERT_TRUE(m.hole_chords.mean_m);
     EXPECT_NEAR(m.hole_chords.mean_m->value, 4 * r / 3, 4 * 0.35 / 40 * 4 * r / 3);
     // Of a ball's chords, the share below x is (x / 2r)^2.
-    for (std::size_t q = 0; q < kShares.size(); ++q)
-        EXPECT_NEAR(*m.hole_chords.quantiles_m[q], 2 * r * std::sqrt(kShares[q]), 0.01) << q;
+    for (std::size_t q = 0; q < kQuantiles.size(); ++q)
+        EXPECT_NEAR(*m.hole_chords.quantiles_m[q], 2 * r * std::sqrt(kQuantiles[q]), 0.01) << q;
     EXPECT_NEAR(m.pores->mean_m, 2 * r, 0.0125);
     EXPECT_NEAR(m.pores->greatest_m, 2 * r, 0.0125);
     EXPECT_EQ(m.euler_faces, 2); // a piece and a cavity
@@ -84,8 +84,8 @@ TEST(Pores, BooleanHolesAreAsPredicted) {
                "pairs at " + std::to_string(c.distance_m));
     // Chords between balls thrown at random are exponential.
     const Estimate mean = *m.solid_chords.mean_m;
-    for (std::size_t q = 2; q < kShares.size(); ++q) {
-        const double exact = -mean.value * std::log(1 - kShares[q]);
+    for (std::size_t q = 2; q < kQuantiles.size(); ++q) {
+        const double exact = -mean.value * std::log(1 - kQuantiles[q]);
         EXPECT_NEAR(*m.solid_chords.quantiles_m[q], exact, 4 * *mean.se / mean.value * exact);
     }
     double above = 1;
