@@ -68,7 +68,52 @@ TEST(BooleanModel, EqualBallsMakeASpongeAt31Percent) {
     EXPECT_FALSE(sponge_porosity(Law(Family::lognormal, broad)));
 }
 
+/// The holes' covariance when the mean of 2 D^3 - 3 D^2 r + r^3 over balls larger than r is `lens`.
+double covariance_of(const Law& law, double n_v, double lens) {
+    const double v = kPi / 6 * law.moment(3);
+    return 1 - 2 * std::exp(-n_v * v) + std::exp(-n_v * (2 * v - kPi / 12 * lens));
+}
+
+TEST(BooleanModel, CovarianceHasItsClosedForms) {
+    const double n = 1.3;
+    for (const double r : {0.0, 0.1, 0.5, 0.9, 2.0, 30.0}) {
+        // Exponential: E[(D - r)^2 (2 D + r); D > r] = exp(-L r) (12 / L^3 + 6 r / L^2).
+        const double rate = 2.5;
+        EXPECT_NEAR(boolean_covariance(Law::exponential(rate), n, r),
+                    covariance_of(Law::exponential(rate), n,
+                                  std::exp(-rate * r) *
+                                      (12 / std::pow(rate, 3) + 6 * r / std::pow(rate, 2))),
+                    1e-9); // 1e-13 of r^3 at most
+        const double d = 0.8, lens = r < d ? (d - r) * (d - r) * (2 * d + r) : 0;
+        EXPECT_NEAR(boolean_covariance(Law::constant(d), n, r),
+                    covariance_of(Law::constant(d), n, lens), 1e-9);
+    }
+}
+
+TEST(BooleanModel, CovarianceGoesFromPorosityToItsSquare) {
+    const double uniform[] = {0.2, 1.0}, broad[] = {-1.0, 0.7};
+    const Law table = Law::empirical({{0.1, 0}, {0.4, 0.7}, {1.2, 1}});
+    for (const Law& law : {Law(Family::uniform, uniform), Law(Family::lognormal, broad), table}) {
+        const BooleanModel model = boolean_model(law, 0.9);
+        const double p = model.porosity;
+        EXPECT_NEAR(boolean_covariance(law, 0.9, 0), p, 1e-14);
+        EXPECT_NEAR(boolean_covariance(law, 0.9, 1e6), p * p, 1e-14);
+        // At 0 it falls by S_V / 4 a unit.
+        const double h = 1e-5;
+        EXPECT_NEAR((p - boolean_covariance(law, 0.9, h)) / h, model.s_v / 4, 1e-4 * model.s_v);
+        double before = p;
+        for (double r = 0.05; r < 3; r += 0.05) {
+            const double c = boolean_covariance(law, 0.9, r);
+            EXPECT_LE(c, before + 1e-12);
+            EXPECT_GE(c, p * p - 1e-12);
+            before = c;
+        }
+    }
+}
+
 TEST(BooleanModel, RefusesByName) {
+    expect_error(Fault::bad_argument, "the distance is -1",
+                 [] { boolean_covariance(Law::exponential(1), 1, -1); });
     expect_error(Fault::bad_argument, "n_v is -1", [] { boolean_model(Law::exponential(1), -1); });
     expect_error(Fault::bad_argument, "a share 1 of holes", [] { overlap_corrected_n_a(3, 1); });
     expect_error(Fault::bad_argument, "n_v is -2",
