@@ -217,8 +217,6 @@ public:
 
     std::shared_ptr<const Field> field(const RecipeScene& scene,
                                        const Similarity& at) const override {
-        if (blend_m_ == 0)
-            return std::make_shared<PlacedLevelSetField>(grid(scene, at), Similarity());
         std::vector<std::shared_ptr<const Field>> fields = {of_.front()->field(scene, at)};
         fields.push_back(std::make_shared<BallsField>(spheres(scene, at, nullptr)));
         add_others(scene, at, fields);
