@@ -19,7 +19,7 @@ constexpr double kVoxel = 0.05; // 40 voxels across
 constexpr int kReach = 22;      // voxels from the origin to the faces of the dense grid
 
 struct Counts {
-    int n = 0, n_awkward = 0, n_empty = 0;
+    int n = 0, n_awkward = 0, n_empty = 0, n_tiny = 0;
     double worst_vox = 0;  ///< of a distance in the band
     int n_wrong_signs = 0; ///< of voxels farther than 1e-3 voxels from the surface
     std::map<std::string, int> kinds;
@@ -51,11 +51,18 @@ Counts run_recipes(std::uint64_t first, std::uint64_t n) {
         const std::string where = "recipe " + std::to_string(seed);
         try {
             judge(recipe, *make_recipe(recipe.text, where, {}).solid, counts);
-        } catch (const Error& e) { // parts that do not meet: no voxel may be inside
-            if (std::string(e.what()).find("is empty") == std::string::npos)
+        } catch (const Error& e) { // parts that do not meet, or all but so: no voxel may be inside
+            const std::string what = e.what();
+            if (what.find("voxels long, must be at least 4") != std::string::npos) {
+                ++counts.n_tiny;
+                continue;
+            }
+            if (what.find("is empty") == std::string::npos)
                 throw;
             ++counts.n_empty;
+            const double worst = counts.worst_vox; // a near miss has distances, but no level set
             judge(recipe, *openvdb::FloatGrid::create(static_cast<float>(3 * kVoxel)), counts);
+            counts.worst_vox = worst;
         }
     }
     return counts;
@@ -78,9 +85,9 @@ int main(int argc, char** argv) {
     openvdb::initialize();
     if (argc == 2 && argv[1][0] != '-') {
         const auto c = taihu::run_recipes(0, std::strtoull(argv[1], nullptr, 10));
-        std::printf(
-            "%d recipes, %d awkward, %d empty: worst distance %.2e voxels, %d wrong signs\n", c.n,
-            c.n_awkward, c.n_empty, c.worst_vox, c.n_wrong_signs);
+        std::printf("%d recipes, %d awkward, %d empty, %d refused as too small for the voxel: "
+                    "worst distance %.2e voxels, %d wrong signs\n",
+                    c.n, c.n_awkward, c.n_empty, c.n_tiny, c.worst_vox, c.n_wrong_signs);
         for (const auto& [kind, n] : c.kinds)
             std::printf("%-14s in %5.1f %%\n", kind.c_str(), 100.0 * n / c.n);
         return c.n_wrong_signs > 0 || c.worst_vox > 1e-3;
