@@ -5,47 +5,97 @@
 
 #include "vdb_ops/kernels_detail.h"
 
+// Vectors go between functions that are always inlined: no call for an ABI to differ in.
+#pragma GCC diagnostic ignored "-Wpsabi"
+#define TAIHU_INLINE __attribute__((always_inline)) inline
+
 namespace taihu {
 
+constexpr float kMargin = 1e-3f; // voxels; distances are right to a fifth of that
+
+// Eight voxels along z at a time; compilers split them where registers are shorter.
+typedef float V8 __attribute__((vector_size(32)));
+typedef std::int32_t Lanes __attribute__((vector_size(32)));
+typedef double D8 __attribute__((vector_size(64)));
+
+namespace {
+
+constexpr V8 kZ = {0, 1, 2, 3, 4, 5, 6, 7}, kZero = {}, kOne = kZero + 1.f;
+
+TAIHU_INLINE V8 load(const float* p) {
+    V8 v;
+    std::memcpy(&v, p, sizeof v);
+    return v;
+}
+
+TAIHU_INLINE void store(float* p, const V8& v) {
+    std::memcpy(p, &v, sizeof v);
+}
+
+/// Bit k is set where lane k is.
+TAIHU_INLINE std::uint64_t bits_of(const Lanes& lanes) {
+    typedef signed char Bytes __attribute__((vector_size(8)));
+    const Bytes bytes = __builtin_convertvector(lanes, Bytes);
+    std::uint64_t word;
+    std::memcpy(&word, &bytes, sizeof word);
+    return (word & 0x8040201008040201u) * 0x0101010101010101u >> 56;
+}
+
+/// Lane k is set where bit k of row `i` of the leaf is.
+TAIHU_INLINE Lanes lanes_of(const LeafBits& bits, int i) {
+    constexpr Lanes kBit = {1, 2, 4, 8, 16, 32, 64, 128};
+    return (kBit & static_cast<std::int32_t>(bits.word[i / 8] >> i % 8 * 8 & 255)) != 0;
+}
+
+TAIHU_INLINE Lanes below(const V8& v, float limit) {
+    return (v < limit) & (v > -limit);
+}
+
+/// v in the band, +-limit elsewhere.
+TAIHU_INLINE V8 hold(const V8& v, const Lanes& band, float limit) {
+    const V8 side = v < kZero ? kZero - limit : kZero + limit;
+    return band ? v : side;
+}
+
+} // namespace
+
 TAIHU_CLONES
-void min_balls(const LeafBall* balls, std::size_t n, float half_width, float* values) {
-    for (std::size_t i = 0; i < n; ++i) {
-        const LeafBall ball = balls[i];
-        const float reach = ball.r + half_width, reach2 = reach * reach;
-        float z2[8];
-        for (int z = 0; z < 8; ++z) {
-            const float dz = static_cast<float>(z) - ball.z;
-            z2[z] = dz * dz;
-        }
-        // Only rows that the ball's band meets: ranges instead of a branch per row.
-        const int x0 = static_cast<int>(std::ceil(std::max(0.f, ball.x - reach)));
-        const int x1 = static_cast<int>(std::floor(std::min(7.f, ball.x + reach)));
+void subtract_balls(const LeafBall* balls, const std::uint32_t* begin, const std::uint32_t* end,
+                    const int* leaf, float least, float* values) {
+    for (; begin != end; ++begin) {
+        const LeafBall& ball = balls[*begin];
+        const float cx = ball.x - static_cast<float>(leaf[0]),
+                    cy = ball.y - static_cast<float>(leaf[1]),
+                    cz = ball.z - static_cast<float>(leaf[2]), r = ball.r;
+        // Only rows that can gain by it. The margin is beyond what rounding does: leaving a row out
+        // changes no bit.
+        const float reach = r - least + kMargin, reach2 = reach * reach;
+        const V8 dz = kZ - cz, z2 = dz * dz;
+        const int x0 = static_cast<int>(std::max(0.f, cx - reach));
+        const int x1 = static_cast<int>(std::min(7.f, cx + reach));
         for (int x = x0; x <= x1; ++x) {
-            const float dx = static_cast<float>(x) - ball.x, dx2 = dx * dx;
+            const float dx = static_cast<float>(x) - cx, dx2 = dx * dx;
             const float reach_y = std::sqrt(std::max(0.f, reach2 - dx2));
-            const int y0 = static_cast<int>(std::ceil(std::max(0.f, ball.y - reach_y)));
-            const int y1 = static_cast<int>(std::floor(std::min(7.f, ball.y + reach_y)));
+            const int y0 = static_cast<int>(std::max(0.f, cy - reach_y));
+            const int y1 = static_cast<int>(std::min(7.f, cy + reach_y));
             for (int y = y0; y <= y1; ++y) {
-                const float dy = static_cast<float>(y) - ball.y, xy2 = dx2 + dy * dy;
-                float* __restrict row = values + x * 64 + y * 8;
-                for (int z = 0; z < 8; ++z) {
-                    const float d = std::sqrt(xy2 + z2[z]) - ball.r;
-                    row[z] = d < row[z] ? d : row[z];
-                }
+                const float dy = static_cast<float>(y) - cy, xy2 = dx2 + dy * dy;
+                float* row = values + x * 64 + y * 8;
+                const V8 d2 = xy2 + z2, old = load(row);
+                V8 d;
+                for (int z = 0; z < 8; ++z)
+                    d[z] = std::sqrt(d2[z]);
+                d = r - d;
+                store(row, d > old ? d : old);
             }
         }
     }
 }
 
-// Eight voxels along z at a time; compilers split them where registers are shorter.
-typedef float V8 __attribute__((vector_size(32)));
-typedef std::int64_t Lanes __attribute__((vector_size(32)));
-
 TAIHU_CLONES
 void min_triangles(const LeafTriangle* all, const std::uint32_t* begin, const std::uint32_t* end,
                    const int* origin, float half_width, const std::int8_t* winding,
                    float* squared) {
-    constexpr V8 kZ = {0, 1, 2, 3, 4, 5, 6, 7}, kZero = {}, kOne = kZero + 1.f;
     for (; begin != end; ++begin) {
         const LeafTriangle& t = all[*begin];
         // Everything below is relative to the leaf's first voxel. Feet of that voxel on the edges
@@ -101,7 +151,8 @@ void min_triangles(const LeafTriangle* all, const std::uint32_t* begin, const st
                 const V8 plane2 = plane * plane;
                 V8 bound = (dx * dx + dy * dy) + box_z2;
                 bound = bound > plane2 ? bound : plane2;
-                const Lanes nearer = (Lanes)(bound < old);
+                typedef std::int64_t Quads __attribute__((vector_size(32)));
+                const Quads nearer = (Quads)(bound < old);
                 if ((nearer[0] | nearer[1] | nearer[2] | nearer[3]) == 0)
                     continue;
                 V8 best = kZero + 1e30f, inside = best;
@@ -143,17 +194,58 @@ void subtract_values(const float* a, const float* b, float* out) {
 }
 
 TAIHU_CLONES
-std::uint64_t band_bits(const float* values, float half_width) {
-    std::uint64_t bits = 0;
-    for (int i = 0; i < 64; ++i)
-        bits |= std::uint64_t{std::fabs(values[i]) < half_width} << i;
+LeafBits to_band(const float* values, float voxel, float background, float* out) {
+    LeafBits bits{};
+    for (int i = 0; i < 64; ++i) {
+        const V8 v = load(values + 8 * i) * voxel;
+        const Lanes band = below(v, background);
+        store(out + 8 * i, hold(v, band, background));
+        bits.word[i / 8] |= bits_of(band) << i % 8 * 8;
+    }
     return bits;
 }
 
 TAIHU_CLONES
-void scale_values(const float* values, float scale, float* out) {
-    for (int i = 0; i < 512; ++i)
-        out[i] = values[i] * scale;
+LeafBits copy_band(const float* values, const LeafBits& active, float background, float* out) {
+    LeafBits bits{};
+    for (int i = 0; i < 64; ++i) {
+        const V8 v = load(values + 8 * i);
+        const Lanes band = lanes_of(active, i) & below(v, background);
+        store(out + 8 * i, hold(v, band, background));
+        bits.word[i / 8] |= bits_of(band) << i % 8 * 8;
+    }
+    return bits;
+}
+
+TAIHU_CLONES
+void take_values(const float* values, const LeafBits& active, float half_width, float inverse_voxel,
+                 float* out) {
+    for (int i = 0; i < 64; ++i) {
+        const V8 v = load(values + 8 * i) * inverse_voxel;
+        store(out + 8 * i, hold(v, lanes_of(active, i) & below(v, half_width), half_width));
+    }
+}
+
+namespace {
+
+/// Share of a tent of half width 1 about `d` that lies below 0.
+TAIHU_INLINE V8 inside_share(const V8& d) {
+    V8 rest = d < kZero ? kOne + d : kOne - d;
+    rest = rest > kZero ? rest : kZero;
+    const V8 half = 0.5f * rest * rest;
+    return d > kZero ? half : kOne - half;
+}
+
+} // namespace
+
+TAIHU_CLONES
+double inside_voxels(const float* values, float inverse_voxel) {
+    D8 sum = {};
+    for (int i = 0; i < 64; ++i) {
+        const V8 d = load(values + 8 * i) * inverse_voxel;
+        sum += __builtin_convertvector(4 * inside_share(d) - inside_share(0.5f * d), D8);
+    }
+    return (((sum[0] + sum[4]) + (sum[2] + sum[6])) + ((sum[1] + sum[5]) + (sum[3] + sum[7]))) / 3;
 }
 
 } // namespace taihu

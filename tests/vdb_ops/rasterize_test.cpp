@@ -68,7 +68,8 @@ TEST(LevelSetField, BandsStayBandsAtAnyVoxelSize) {
         const auto grid = ball_rock(1, voxel);
         const auto again = rasterize(LevelSetField(grid), lattice_of(*grid));
         EXPECT_EQ(again->activeVoxelCount(), grid->activeVoxelCount()) << voxel;
-        for (auto it = grid->cbeginValueOn(); it; ++it) // to voxels and back: the last bit of a float
+        for (auto it = grid->cbeginValueOn(); it;
+             ++it) // to voxels and back: the last bit of a float
             ASSERT_NEAR(again->tree().getValue(it.getCoord()), *it, 1e-6 * voxel);
     }
 }

@@ -1,0 +1,61 @@
+#pragma once
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "stats/core/vec3.h"
+#include "vdb_ops/field.h"
+
+namespace taihu {
+
+/// A ball in voxel coordinates.
+struct VoxelBall {
+    Vec3 center;
+    double r;
+};
+
+/// Which balls come near which cubes of a lattice of them: cube (i, j, k) holds the voxels from
+/// (i, j, k) * size on, size along each edge.
+class CubeLists {
+public:
+    /// A ball near a cube, or kCovered in its place: the cube lies deep inside a ball.
+    struct Hit {
+        std::uint32_t cube, ball;
+    };
+    static constexpr std::uint32_t kCovered = ~std::uint32_t{0};
+
+    /// \param n  cubes along each axis; their product is below 2^32.
+    CubeLists(int size, const openvdb::Coord& n, double half_width)
+        : size_(size), n_(n), half_width_(half_width) {}
+
+    /// Appends what ball number `ball` does; thread-safe.
+    void find(const VoxelBall& ball, std::uint32_t number, std::vector<Hit>& hits) const;
+    /// Sorts all hits by cube; within a cube they keep their order.
+    void sort(std::span<const std::vector<Hit>> hits);
+
+    Cover cover(std::size_t cube) const {
+        if (covered_[cube])
+            return Cover::inside;
+        return first_[cube] == first_[cube + 1] ? Cover::outside : Cover::surface;
+    }
+    /// The balls near a cube; empty where one covers it.
+    std::span<const std::uint32_t> balls(std::size_t cube) const {
+        return {balls_.data() + first_[cube], balls_.data() + first_[cube + 1]};
+    }
+    std::size_t index(int i, int j, int k) const {
+        return (static_cast<std::size_t>(i) * static_cast<std::size_t>(n_.y()) +
+                static_cast<std::size_t>(j)) *
+                   static_cast<std::size_t>(n_.z()) +
+               static_cast<std::size_t>(k);
+    }
+
+private:
+    int size_;
+    openvdb::Coord n_;
+    double half_width_;
+    std::vector<std::size_t> first_; ///< balls of cube i: balls_[first_[i] .. first_[i + 1])
+    std::vector<std::uint32_t> balls_;
+    std::vector<char> covered_;
+};
+
+} // namespace taihu
