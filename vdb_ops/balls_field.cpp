@@ -35,27 +35,22 @@ void subtract_large(const VoxelBall& ball, const Coord& leaf, float* values) {
 
 class BallsBlock final : public BlockSampler {
 public:
-    /// \param near  those of `all` that come near the block.
+    /// \param near  those of `all` that come near the block, large ones first.
     BallsBlock(const Coord& block, const std::vector<VoxelBall>& all,
                std::span<const std::uint32_t> near, float half_width)
         : block_(block), half_width_(half_width), leaves_(kLeaf, Coord(kAcross), half_width) {
         const Vec3 origin{double(block.x()), double(block.y()), double(block.z())};
         std::vector<CubeLists::Hit> hits;
-        const auto add = [&](const VoxelBall& ball) {
-            const Vec3 c = ball.center - origin;
-            leaves_.find({c, ball.r}, static_cast<std::uint32_t>(balls_.size()), hits);
-            balls_.push_back({static_cast<float>(c.x), static_cast<float>(c.y),
-                              static_cast<float>(c.z), static_cast<float>(ball.r)});
-        };
         balls_.reserve(near.size());
-        for (const std::uint32_t i : near) // before the others: their numbers tell them apart
-            if (all[i].r > kLarge) {
-                large_.push_back({all[i].center - origin, all[i].r});
-                add(all[i]);
-            }
-        for (const std::uint32_t i : near)
-            if (!(all[i].r > kLarge))
-                add(all[i]);
+        for (std::size_t n = 0; n < near.size(); ++n) {
+            __builtin_prefetch(&all[near[std::min(n + 8, near.size() - 1)]]);
+            const VoxelBall ball{all[near[n]].center - origin, all[near[n]].r};
+            leaves_.find(ball, static_cast<std::uint32_t>(n), hits);
+            balls_.push_back({static_cast<float>(ball.center.x), static_cast<float>(ball.center.y),
+                              static_cast<float>(ball.center.z), static_cast<float>(ball.r)});
+            if (ball.r > kLarge) // large ones come first
+                large_.push_back(ball);
+        }
         leaves_.sort({&hits, 1});
     }
 
@@ -110,6 +105,8 @@ public:
         }
         if (balls_.empty())
             return;
+        std::partition(balls_.begin(), balls_.end(),
+                       [](const VoxelBall& ball) { return ball.r > kLarge; });
         box_ = CoordBBox(voxel(box.lo), voxel(box.hi));
         list_cells(region);
     }

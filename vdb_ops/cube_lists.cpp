@@ -8,54 +8,54 @@ namespace {
 
 constexpr double kMargin = 1e-3; // voxels: more than rounding does
 
-/// A row of cubes along one axis, seen from a point at `c`.
-struct Row {
-    double c, size;
+/// Squared distance along one axis from `c` to the nearest of the voxels `first` to `last`.
+double nearest2(double c, double first, double last) {
+    const double out = std::max(std::max(first - c, c - last), 0.0);
+    return out * out;
+}
 
-    double nearest2(int i) const { // of the voxels of cube i, squared
-        const double first = i * size, out = std::max({first - c, c - (first + size - 1), 0.0});
-        return out * out;
-    }
-    double farthest2(int i) const {
-        const double first = i * size, far = std::max(c - first, first + size - 1 - c);
-        return far * far;
-    }
-};
+double farthest2(double c, double first, double last) {
+    const double far = std::max(c - first, last - c);
+    return far * far;
+}
 
 } // namespace
 
 void CubeLists::find(const VoxelBall& ball, std::uint32_t number, std::vector<Hit>& hits) const {
     const double reach = ball.r + half_width_ + kMargin, inner = ball.r - half_width_ - kMargin;
-    const double reach2 = reach * reach;
+    const double reach2 = reach * reach, inner2 = inner * inner;
+    const double size = size_, edge = size - 1; // from the first voxel to the last
+    const bool may_cover = inner >= std::sqrt(0.75) * edge;
+    const Vec3 c = ball.center;
     int lo[3], hi[3];
+    std::size_t n_box = 1;
     for (int axis = 0; axis < 3; ++axis) {
-        const double c = ball.center[axis];
-        lo[axis] =
-            static_cast<int>(std::clamp(std::floor((c - reach) / size_), 0.0, double(n_[axis])));
-        hi[axis] =
-            static_cast<int>(std::clamp(std::floor((c + reach) / size_), -1.0, n_[axis] - 1.0));
-        if (lo[axis] > hi[axis])
+        const double from = (c[axis] - reach) * inverse_size_;
+        const double to = (c[axis] + reach) * inverse_size_, last = n_[axis] - 1;
+        if (!(to >= 0 && from < last + 1))
             return;
+        lo[axis] = static_cast<int>(std::max(from, 0.0));
+        hi[axis] = static_cast<int>(std::min(to, last));
+        n_box *= static_cast<std::size_t>(hi[axis] - lo[axis] + 1);
     }
-    const Row x{ball.center.x, double(size_)}, y{ball.center.y, double(size_)},
-        z{ball.center.z, double(size_)};
-    const double half_diagonal = std::sqrt(0.75) * (size_ - 1);
-    const bool may_cover = inner >= half_diagonal;
     std::size_t n = hits.size();
-    for (int i = lo[0]; i <= hi[0]; ++i)
+    hits.resize(n + n_box);
+    for (int i = lo[0]; i <= hi[0]; ++i) {
+        const double x = i * size, near_x2 = nearest2(c.x, x, x + edge),
+                     far_x2 = farthest2(c.x, x, x + edge);
         for (int j = lo[1]; j <= hi[1]; ++j) {
-            const double near2 = x.nearest2(i) + y.nearest2(j);
-            if (near2 >= reach2)
-                continue;
-            hits.resize(n + static_cast<std::size_t>(hi[2] - lo[2] + 1));
-            const double far2 = x.farthest2(i) + y.farthest2(j);
-            for (int k = lo[2]; k <= hi[2]; ++k) {
-                const bool covered = may_cover && far2 + z.farthest2(k) <= inner * inner;
+            const double y = j * size, near2 = near_x2 + nearest2(c.y, y, y + edge),
+                         far2 = far_x2 + farthest2(c.y, y, y + edge);
+            auto cube = static_cast<std::uint32_t>(index(i, j, lo[2]));
+            double z = lo[2] * size;
+            for (int k = lo[2]; k <= hi[2]; ++k, ++cube, z += size) {
+                const bool covered = may_cover && far2 + farthest2(c.z, z, z + edge) <= inner2;
                 // Written in any case and kept if it counts: no branch to guess wrong.
-                hits[n] = {static_cast<std::uint32_t>(index(i, j, k)), covered ? kCovered : number};
-                n += near2 + z.nearest2(k) < reach2;
+                hits[n] = {cube, covered ? kCovered : number};
+                n += near2 + nearest2(c.z, z, z + edge) < reach2;
             }
         }
+    }
     hits.resize(n);
 }
 

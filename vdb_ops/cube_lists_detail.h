@@ -26,7 +26,7 @@ public:
 
     /// \param n  cubes along each axis; their product is below 2^32.
     CubeLists(int size, const openvdb::Coord& n, double half_width)
-        : size_(size), n_(n), half_width_(half_width) {}
+        : size_(size), inverse_size_(1.0 / size), n_(n), half_width_(half_width) {}
 
     /// Appends what ball number `ball` does; thread-safe.
     void find(const VoxelBall& ball, std::uint32_t number, std::vector<Hit>& hits) const;
@@ -50,7 +50,7 @@ public:
     }
 
 private:
-    int size_;
+    double size_, inverse_size_;
     openvdb::Coord n_;
     double half_width_;
     std::vector<std::size_t> first_; ///< balls of cube i: balls_[first_[i] .. first_[i + 1])

@@ -16,11 +16,13 @@ constexpr float kMargin = 1e-3f; // voxels; distances are right to a fifth of th
 // Eight voxels along z at a time; compilers split them where registers are shorter.
 typedef float V8 __attribute__((vector_size(32)));
 typedef std::int32_t Lanes __attribute__((vector_size(32)));
+typedef float V16 __attribute__((vector_size(64)));
 typedef double D8 __attribute__((vector_size(64)));
 
 namespace {
 
-constexpr V8 kZ = {0, 1, 2, 3, 4, 5, 6, 7}, kZero = {}, kOne = kZero + 1.f;
+constexpr V8 kZ = {0, 1, 2, 3, 4, 5, 6, 7}, kZero = {}, kOne = kZero + 1.f,
+             kLast = kZero + 7.f;
 
 TAIHU_INLINE V8 load(const float* p) {
     V8 v;
@@ -67,26 +69,37 @@ void subtract_balls(const LeafBall* balls, const std::uint32_t* begin, const std
         const float cx = ball.x - static_cast<float>(leaf[0]),
                     cy = ball.y - static_cast<float>(leaf[1]),
                     cz = ball.z - static_cast<float>(leaf[2]), r = ball.r;
+        const V8 dx = kZ - cx, dy = kZ - cy, dz = kZ - cz, dx2 = dx * dx, dy2 = dy * dy,
+                 z2 = dz * dz;
+        float yz2[64];
+        for (int y = 0; y < 8; ++y)
+            store(yz2 + 8 * y, z2 + dy2[y]);
         // Only rows that can gain by it. The margin is beyond what rounding does: leaving a row out
         // changes no bit.
-        const float reach = r - least + kMargin, reach2 = reach * reach;
-        const V8 dz = kZ - cz, z2 = dz * dz;
-        const int x0 = static_cast<int>(std::max(0.f, cx - reach));
-        const int x1 = static_cast<int>(std::min(7.f, cx + reach));
-        for (int x = x0; x <= x1; ++x) {
-            const float dx = static_cast<float>(x) - cx, dx2 = dx * dx;
-            const float reach_y = std::sqrt(std::max(0.f, reach2 - dx2));
-            const int y0 = static_cast<int>(std::max(0.f, cy - reach_y));
-            const int y1 = static_cast<int>(std::min(7.f, cy + reach_y));
-            for (int y = y0; y <= y1; ++y) {
-                const float dy = static_cast<float>(y) - cy, xy2 = dx2 + dy * dy;
-                float* row = values + x * 64 + y * 8;
-                const V8 d2 = xy2 + z2, old = load(row);
-                V8 d;
-                for (int z = 0; z < 8; ++z)
-                    d[z] = std::sqrt(d2[z]);
+        const float reach = r - least + kMargin;
+        V8 rest = reach * reach - dx2, reach_y;
+        const Lanes empty = rest < kZero;
+        rest = empty ? kZero : rest;
+        for (int x = 0; x < 8; ++x)
+            reach_y[x] = std::sqrt(rest[x]);
+        V8 from = cy - reach_y, to = cy + reach_y;
+        from = from < kZero ? kZero : from;
+        to = to > kLast ? kLast : to;
+        Lanes y0 = __builtin_convertvector(from, Lanes), y1 = __builtin_convertvector(to, Lanes);
+        y0 -= __builtin_convertvector(y0, V8) < from; // rounded up
+        y1 = empty ? Lanes{} - 1 : y1;
+        for (int x = 0; x < 8; ++x) {
+            float* slab = values + x * 64;
+            for (int y = y0[x] & ~1; y <= y1[x]; y += 2) { // two rows at a time
+                V16 d, old;
+                std::memcpy(&d, yz2 + 8 * y, sizeof d);
+                std::memcpy(&old, slab + 8 * y, sizeof old);
+                d += dx2[x];
+                for (int i = 0; i < 16; ++i)
+                    d[i] = std::sqrt(d[i]);
                 d = r - d;
-                store(row, d > old ? d : old);
+                d = d > old ? d : old;
+                std::memcpy(slab + 8 * y, &d, sizeof d);
             }
         }
     }
