@@ -21,7 +21,7 @@ constexpr int kLeaf = BlockSampler::kLeaf;
 constexpr int kAcross = kBlock / kLeaf;
 
 constexpr double kLarge = 2048; // voxels: floats would lose 1e-4 of one
-constexpr double kMostCells = 0x1p21;
+constexpr double kMostCells = 0x1p21, kMostLooks = 0x1p24;
 constexpr std::size_t kChunk = 1024; // balls
 
 /// values = max(values, r - |x - c|) for the leaf that begins at `leaf`, in double.
@@ -143,36 +143,46 @@ private:
     }
     void list_cells(const CoordBBox& region) {
         CoordBBox box = box_;
-        box.intersect(region);
+        for (int axis = 0; axis < 3; ++axis) { // whole blocks
+            box.min()[axis] = std::max(box.min()[axis], region.min()[axis] & -kBlock);
+            box.max()[axis] = std::min(box.max()[axis], region.max()[axis] | (kBlock - 1));
+        }
         if (box.empty())
             return;
-        const auto n_cells = [&] {
-            const Coord n = (box >> shift_).dim();
-            return double(n.x()) * double(n.y()) * double(n.z());
-        };
-        while (n_cells() > kMostCells)
+        while (!cells_fit(box))
             ++shift_;
-        cell_box_ = box >> shift_;
-        const int size = 1 << shift_;
-        cells_.emplace(size, cell_box_.dim(), half_width_);
-        const Vec3 origin = Vec3{double(cell_box_.min().x()), double(cell_box_.min().y()),
-                                 double(cell_box_.min().z())} *
-                            size;
         std::vector<std::vector<CubeLists::Hit>> hits((balls_.size() + kChunk - 1) / kChunk);
         tbb::parallel_for(std::size_t{0}, hits.size(), [&](std::size_t chunk) {
             const std::size_t end = std::min(balls_.size(), (chunk + 1) * kChunk);
             for (std::size_t i = chunk * kChunk; i < end; ++i)
-                cells_->find({balls_[i].center - origin, balls_[i].r},
+                cells_->find({balls_[i].center - origin_, balls_[i].r},
                              static_cast<std::uint32_t>(i), hits[chunk]);
         });
         cells_->sort(hits);
     }
+    /// Makes cells of 2^shift_ voxels; false when there would be too many of them, or too many
+    /// balls in them.
+    bool cells_fit(const CoordBBox& box) {
+        cell_box_ = box >> shift_;
+        const Coord n = cell_box_.dim(), first = cell_box_.min() << shift_;
+        if (double(n.x()) * double(n.y()) * double(n.z()) > kMostCells)
+            return false;
+        origin_ = {double(first.x()), double(first.y()), double(first.z())};
+        const int size = 1 << shift_;
+        cells_.emplace(size, n, half_width_);
+        double n_looked_at = 0; // by those that may look at more than 64
+        for (const VoxelBall& ball : balls_)
+            if (ball.r > size)
+                n_looked_at += cells_->n_looked_at({ball.center - origin_, ball.r});
+        return n_looked_at <= kMostLooks + 64 * static_cast<double>(balls_.size());
+    }
 
     float half_width_;
-    std::vector<VoxelBall> balls_;
+    std::vector<VoxelBall> balls_; ///< large ones first
     CoordBBox box_;
     std::size_t shift_ = 6; ///< cells are cubes of 2^shift_ voxels
-    CoordBBox cell_box_;    ///< numbers of the cells
+    CoordBBox cell_box_;    ///< their numbers
+    Vec3 origin_;           ///< first voxel of the first cell
     std::optional<CubeLists> cells_;
 };
 

@@ -17,10 +17,13 @@ struct CarveResult {
 
 /// Subtract the union of `holes` from `rock`: out(x) = max(rock(x), max_i(r_i - |x - c_i|)), leaf
 /// by leaf, without a grid of the union. Holes that lie outside the rock, inside others or deep in
-/// the air cost nothing. A function of its arguments alone: neither the order of `holes` nor the
-/// thread count changes a bit. Time O(leaves that the surface of the result passes), memory that of
-/// the result. \param rock   level set: cubic voxels, values [m], negative inside, half band >= 2
-/// voxels. \param holes  balls in world space [m]; may overlap and may stick out of the rock.
+/// the air cost next to nothing; leaves that no hole comes near are taken over bit for bit. A
+/// function of its arguments alone: neither the order of `holes` nor the thread count changes a
+/// bit. Time O(leaves that the surface of the result passes), memory that of the result.
+///
+/// \param rock   level set: cubic voxels, values [m], negative inside, half band >= 2 voxels.
+/// \param holes  balls in world space [m]; may overlap and may stick out of the rock.
+///
 /// \throws Error bad_argument: not a level set, or `holes[i]` with a radius not finite and > 0;
 ///   cancelled: as soon as `progress` says so; `rock` is untouched.
 CarveResult carve(const openvdb::FloatGrid& rock, std::span<const Sphere> holes,

@@ -1,4 +1,5 @@
 #include <algorithm>
+#include <atomic>
 #include <cmath>
 
 #include "vdb_ops/cube_lists_detail.h"
@@ -21,38 +22,51 @@ double farthest2(double c, double first, double last) {
 
 } // namespace
 
-void CubeLists::find(const VoxelBall& ball, std::uint32_t number, std::vector<Hit>& hits) const {
-    const double reach = ball.r + half_width_ + kMargin, inner = ball.r - half_width_ - kMargin;
-    const double reach2 = reach * reach, inner2 = inner * inner;
-    const double size = size_, edge = size - 1; // from the first voxel to the last
-    const bool may_cover = inner >= std::sqrt(0.75) * edge;
-    const Vec3 c = ball.center;
-    int lo[3], hi[3];
-    std::size_t n_box = 1;
+bool CubeLists::box_of(const VoxelBall& ball, openvdb::Coord& lo, openvdb::Coord& hi) const {
+    const double reach = ball.r + half_width_ + kMargin;
     for (int axis = 0; axis < 3; ++axis) {
-        const double from = (c[axis] - reach) * inverse_size_;
-        const double to = (c[axis] + reach) * inverse_size_, last = n_[axis] - 1;
+        const double from = (ball.center[axis] - reach) * inverse_size_;
+        const double to = (ball.center[axis] + reach) * inverse_size_, last = n_[axis] - 1;
         if (!(to >= 0 && from < last + 1))
-            return;
+            return false;
         lo[axis] = static_cast<int>(std::max(from, 0.0));
         hi[axis] = static_cast<int>(std::min(to, last));
-        n_box *= static_cast<std::size_t>(hi[axis] - lo[axis] + 1);
     }
+    return true;
+}
+
+double CubeLists::n_looked_at(const VoxelBall& ball) const {
+    openvdb::Coord lo, hi;
+    return box_of(ball, lo, hi) ? double(openvdb::CoordBBox(lo, hi).volume()) : 0;
+}
+
+void CubeLists::find(const VoxelBall& ball, std::uint32_t number, std::vector<Hit>& hits) {
+    openvdb::Coord lo, hi;
+    if (!box_of(ball, lo, hi))
+        return;
+    const double reach = ball.r + half_width_ + kMargin, inner = ball.r - half_width_ - kMargin;
+    const double reach2 = reach * reach, inner2 = inner * inner;
+    const double edge = size_ - 1; // from the first voxel of a cube to its last
+    const bool may_cover = inner >= std::sqrt(0.75) * edge;
+    const Vec3 c = ball.center;
     std::size_t n = hits.size();
-    hits.resize(n + n_box);
-    for (int i = lo[0]; i <= hi[0]; ++i) {
-        const double x = i * size, near_x2 = nearest2(c.x, x, x + edge),
+    hits.resize(n + openvdb::CoordBBox(lo, hi).volume());
+    for (int i = lo.x(); i <= hi.x(); ++i) {
+        const double x = i * size_, near_x2 = nearest2(c.x, x, x + edge),
                      far_x2 = farthest2(c.x, x, x + edge);
-        for (int j = lo[1]; j <= hi[1]; ++j) {
-            const double y = j * size, near2 = near_x2 + nearest2(c.y, y, y + edge),
+        for (int j = lo.y(); j <= hi.y(); ++j) {
+            const double y = j * size_, near2 = near_x2 + nearest2(c.y, y, y + edge),
                          far2 = far_x2 + farthest2(c.y, y, y + edge);
-            auto cube = static_cast<std::uint32_t>(index(i, j, lo[2]));
-            double z = lo[2] * size;
-            for (int k = lo[2]; k <= hi[2]; ++k, ++cube, z += size) {
-                const bool covered = may_cover && far2 + farthest2(c.z, z, z + edge) <= inner2;
+            std::size_t cube = index(i, j, lo.z());
+            double z = lo.z() * size_;
+            for (int k = lo.z(); k <= hi.z(); ++k, ++cube, z += size_) {
+                const std::atomic_ref<char> covered(covered_[cube]);
+                if (may_cover && far2 + farthest2(c.z, z, z + edge) <= inner2)
+                    covered.store(1, std::memory_order_relaxed);
                 // Written in any case and kept if it counts: no branch to guess wrong.
-                hits[n] = {cube, covered ? kCovered : number};
-                n += near2 + nearest2(c.z, z, z + edge) < reach2;
+                hits[n] = {static_cast<std::uint32_t>(cube), number};
+                n += (near2 + nearest2(c.z, z, z + edge) < reach2) &
+                     !covered.load(std::memory_order_relaxed);
             }
         }
     }
@@ -60,12 +74,7 @@ void CubeLists::find(const VoxelBall& ball, std::uint32_t number, std::vector<Hi
 }
 
 void CubeLists::sort(std::span<const std::vector<Hit>> hits) {
-    const std::size_t n_cubes = index(n_.x(), 0, 0);
-    covered_.assign(n_cubes, 0);
-    for (const auto& part : hits)
-        for (const Hit& hit : part)
-            if (hit.ball == kCovered)
-                covered_[hit.cube] = 1;
+    const std::size_t n_cubes = covered_.size();
     first_.assign(n_cubes + 1, 0);
     for (const auto& part : hits)
         for (const Hit& hit : part)

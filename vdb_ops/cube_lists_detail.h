@@ -15,22 +15,25 @@ struct VoxelBall {
 };
 
 /// Which balls come near which cubes of a lattice of them: cube (i, j, k) holds the voxels from
-/// (i, j, k) * size on, size along each edge.
+/// (i, j, k) * size on, size along each edge. First find() for every ball, then sort().
 class CubeLists {
 public:
-    /// A ball near a cube, or kCovered in its place: the cube lies deep inside a ball.
+    /// A ball near a cube.
     struct Hit {
         std::uint32_t cube, ball;
     };
-    static constexpr std::uint32_t kCovered = ~std::uint32_t{0};
 
     /// \param n  cubes along each axis; their product is below 2^32.
     CubeLists(int size, const openvdb::Coord& n, double half_width)
-        : size_(size), inverse_size_(1.0 / size), n_(n), half_width_(half_width) {}
+        : size_(size), inverse_size_(1.0 / size), n_(n), half_width_(half_width),
+          covered_(index(n.x(), 0, 0), 0) {}
 
-    /// Appends what ball number `ball` does; thread-safe.
-    void find(const VoxelBall& ball, std::uint32_t number, std::vector<Hit>& hits) const;
-    /// Sorts all hits by cube; within a cube they keep their order.
+    /// Appends the cubes that ball number `number` comes near, but for those that turned out to be
+    /// covered by now: they lie deep inside a ball. Thread-safe.
+    void find(const VoxelBall& ball, std::uint32_t number, std::vector<Hit>& hits);
+    /// At most how many cubes find() looks at.
+    double n_looked_at(const VoxelBall& ball) const;
+    /// Sorts all hits by cube, without those in covered ones; within a cube they keep their order.
     void sort(std::span<const std::vector<Hit>> hits);
 
     Cover cover(std::size_t cube) const {
@@ -50,6 +53,9 @@ public:
     }
 
 private:
+    /// The cubes that a ball's box meets; false for none.
+    bool box_of(const VoxelBall& ball, openvdb::Coord& lo, openvdb::Coord& hi) const;
+
     double size_, inverse_size_;
     openvdb::Coord n_;
     double half_width_;

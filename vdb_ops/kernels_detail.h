@@ -32,15 +32,22 @@ struct LeafTriangle {
     float e[3][3];       ///< edge k, from corner k to k + 1
     float en[3][3];      ///< its normal in the plane, inwards
     float inverse_e2[3]; ///< 1 / |e|^2, 0 for no length
+    float lo[3], hi[3];  ///< box grown by the half width
     std::uint32_t shell;
-    float lo[3], hi[3]; ///< box grown by the half width
+    int n_edges; ///< distances to the first 1..3 edges are its business, to the others a
+                 ///< neighbour's
 };
 
 /// squared[512] = min(squared, squared distance to the triangles), leaf at `origin`; rows farther
 /// than `half_width` from a triangle's box are skipped. With `winding` (one count per voxel) a
-/// voxel sees only faces that turn the right side to it: for shells that overlap themselves.
+/// voxel sees only faces that turn the right side to it, with all their edges: for shells that
+/// overlap themselves.
 void min_triangles(const LeafTriangle* all, const std::uint32_t* begin, const std::uint32_t* end,
                    const int* origin, float half_width, const std::int8_t* winding, float* squared);
+
+/// out = the roots of squared distances, negative where the winding number is not 0. Within 1e-5
+/// voxels of the surface they are 0.
+void signed_roots(const float* squared, const std::int8_t* winding, float* out);
 
 /// One bit for each voxel of a leaf.
 struct LeafBits {

@@ -67,20 +67,62 @@ TEST(Carve, IsTheMaximumOfRockAndHolesAtEveryVoxel) {
             }
 }
 
+TEST(Carve, LeavesThatNoHoleReachesAreTheBasesOwn) {
+    const auto rock = ball_rock(1, 0.037); // a voxel that floats do not hold
+    const auto carved = carve(*rock, std::vector<Sphere>{{{0, 0, 1}, 0.3}}).rock;
+    int n_leaves = 0;
+    for (auto leaf = rock->tree().cbeginLeaf(); leaf; ++leaf) {
+        if (leaf->origin().z() >= 0)
+            continue;
+        const auto* same = carved->tree().probeConstLeaf(leaf->origin());
+        ASSERT_TRUE(same && same->buffer() == leaf->buffer() &&
+                    same->valueMask() == leaf->valueMask());
+        ++n_leaves;
+    }
+    EXPECT_GT(n_leaves, 100);
+}
+
+TEST(Carve, LargeHolesFarFromTheOriginAreExact) {
+    const Vec3 far{30000.013, -20000.021, 10000.007};
+    constexpr double kVoxel = 0.05;
+    const auto base = rasterize(BallsField(std::array<Sphere, 1>{{{far, 1}}}), {kVoxel, {}, 3});
+    for (const double r : {5.0, 102.0, 103.0, 5000.0}) { // floats up to 2048 voxels, then doubles
+        const Sphere hole{far + Vec3{0.6, 0.8, 0} * r, r};
+        const auto rock = carve(*base, std::vector<Sphere>{hole}).rock;
+        int n_hole = 0;
+        for (auto it = rock->cbeginValueOn(); it; ++it) {
+            const openvdb::Coord c = it.getCoord();
+            const Vec3 p = Vec3{double(c.x()), double(c.y()), double(c.z())} * kVoxel;
+            const double of_base = length(p - far) - 1, of_hole = r - length(p - hole.center);
+            ASSERT_NEAR(*it, std::max(of_base, of_hole), 1e-3 * kVoxel) << r;
+            n_hole += of_hole > of_base;
+        }
+        EXPECT_GT(n_hole, 1000) << r;
+    }
+}
+
 TEST(Carve, OrderOfTheHolesChangesNoBit) {
     const auto rock = ball_rock(1, 0.03);
-    std::vector<Sphere> holes = random_holes(300);
+    std::vector<Sphere> holes = random_holes(3000);
+    holes.insert(holes.end(), holes.begin(), holes.begin() + 50); // the same again
+    holes.push_back({{0, -100, 0}, 99.2});                        // 3307 voxels
     const std::string forward = grid_hash(*carve(*rock, holes).rock);
     std::reverse(holes.begin(), holes.end());
     EXPECT_EQ(grid_hash(*carve(*rock, holes).rock), forward);
+    const auto key = [](const Sphere& s) { return std::fmod(1e6 * s.center.x, 1); };
+    std::stable_sort(holes.begin(), holes.end(),
+                     [&](const Sphere& a, const Sphere& b) { return key(a) < key(b); });
+    EXPECT_EQ(grid_hash(*carve(*rock, holes).rock), forward);
 }
 
-TEST(Carve, IsBitIdenticalOnOneThreadAndMany) {
+TEST(Carve, IsBitIdenticalOnAnyNumberOfThreads) {
     const auto rock = ball_rock(1, 0.02);
-    const std::vector<Sphere> holes = random_holes(300);
-    const std::string many = grid_hash(*carve(*rock, holes).rock);
-    const tbb::global_control one(tbb::global_control::max_allowed_parallelism, 1);
-    EXPECT_EQ(grid_hash(*carve(*rock, holes).rock), many);
+    const std::vector<Sphere> holes = random_holes(3000);
+    const std::string usual = grid_hash(*carve(*rock, holes).rock);
+    for (const std::size_t n : {1, 3, 16}) {
+        const tbb::global_control threads(tbb::global_control::max_allowed_parallelism, n);
+        EXPECT_EQ(grid_hash(*carve(*rock, holes).rock), usual) << n;
+    }
 }
 
 TEST(Carve, AnotherHoleNeverAddsVolume) {
@@ -116,6 +158,13 @@ TEST(Carve, AHoleAsLargeAsAPlanetCutsFlat) {
         EXPECT_NEAR(volume_carved(*ball_rock(), std::vector<Sphere>{{{0, -r, 0}, r}}).porosity(),
                     0.5, 1e-3)
             << r;
+}
+
+TEST(Carve, ManyHolesThatReachEverywhereFitInMemory) {
+    std::vector<Sphere> holes;
+    for (int i = 0; i < 300; ++i)
+        holes.push_back({{0, -1e6 - 1e-3 * i, 0}, 1e6});
+    EXPECT_NEAR(volume_carved(*ball_rock(), holes).porosity(), 0.5, 1e-3);
 }
 
 TEST(Carve, CountsHolesThatTheVoxelDoesNotResolve) {

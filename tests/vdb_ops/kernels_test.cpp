@@ -6,6 +6,7 @@
 #define subtract_balls plain_subtract_balls
 #define min_triangles plain_min_triangles
 #define subtract_values plain_subtract_values
+#define signed_roots plain_signed_roots
 #define to_band plain_to_band
 #define copy_band plain_copy_band
 #define take_values plain_take_values
@@ -14,6 +15,7 @@
 #undef subtract_balls
 #undef min_triangles
 #undef subtract_values
+#undef signed_roots
 #undef to_band
 #undef copy_band
 #undef take_values
@@ -142,6 +144,7 @@ TEST(Kernels, EveryInstructionSetGivesTheSameBits) {
         ASSERT_EQ(plain_inside_voxels(values.data(), 1.7f), inside_voxels(values.data(), 1.7f));
 
         LeafTriangle t{};
+        t.n_edges = 1 + static_cast<int>(trial % 3);
         Vec3 p[3];
         for (std::uint32_t k = 0; k < 3; ++k)
             p[k] = {12 * number(trial, 20 + 3 * k) - 2, 12 * number(trial, 21 + 3 * k) - 2,
@@ -164,7 +167,27 @@ TEST(Kernels, EveryInstructionSetGivesTheSameBits) {
         plain_min_triangles(&t, &one, &one + 1, origin, 3, nullptr, c.data());
         min_triangles(&t, &one, &one + 1, origin, 3, nullptr, d.data());
         ASSERT_EQ(c, d);
+
+        std::vector<std::int8_t> winding(512);
+        for (std::uint32_t i = 0; i < 512; ++i)
+            winding[i] = static_cast<std::int8_t>(3 * number(trial, 1300 + i) - 1);
+        plain_signed_roots(c.data(), winding.data(), a.data());
+        signed_roots(c.data(), winding.data(), b.data());
+        ASSERT_EQ(a, b);
     }
+}
+
+TEST(Kernels, SignedRootsAreZeroOnTheSurface) {
+    std::vector<float> squared(512, 4.f), out(512);
+    std::vector<std::int8_t> winding(512, 0);
+    squared[1] = squared[2] = 0.9e-10f; // nearer than 1e-5
+    winding[2] = winding[3] = 1, winding[4] = -2;
+    plain_signed_roots(squared.data(), winding.data(), out.data());
+    EXPECT_EQ(out[0], 2);
+    EXPECT_EQ(out[1], 0);
+    EXPECT_EQ(out[2], 0);
+    EXPECT_EQ(out[3], -2);
+    EXPECT_EQ(out[4], -2);
 }
 
 } // namespace
