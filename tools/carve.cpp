@@ -56,17 +56,18 @@ CleanSettings clean_settings(const CarveArgs& args) {
 }
 
 /// Share of the base that is gone in the end: holes and pieces away, bubbles filled again.
-double final_porosity(const CarveResult& carved, const CleanResult& cleaned) {
+double final_porosity(const CarvedVolume& carved, const CleanResult& cleaned) {
     return (carved.removed_m3 + cleaned.removed_m3 - cleaned.filled_m3) / carved.base_m3;
 }
 
-void tell(const CarveArgs& args, const LawHoles& holes, const CarveResult& carved,
-          const CleanResult& cleaned, std::size_t n_missed, const Console& console) {
+void tell(const CarveArgs& args, const LawHoles& holes, std::size_t n_unresolved,
+          const CarvedVolume& carved, const CleanResult& cleaned, std::size_t n_missed,
+          const Console& console) {
     const std::string where = args.out.string();
     const std::size_t n = holes.placed.holes.size();
     console.say_all(where, holes.comments);
     console.say("{}: carved {} hole{} ({} below 1.5 voxels), removed {:.4g} m^3", where, n,
-                n == 1 ? "" : "s", carved.n_unresolved, carved.removed_m3);
+                n == 1 ? "" : "s", n_unresolved, carved.removed_m3);
     if (n_missed > 0)
         console.say("{}: {} of {} holes do not touch the base; check their unit and place", where,
                     n_missed, n);
@@ -90,17 +91,18 @@ void run(const CarveArgs& args, const Console& console) {
     const Solid base = read_solid(args.base, console);
     const LawHoles holes = read_or_place(args, base, console);
     report_stage(console.progress, "carving");
-    const CarveResult carved = carve(*base.grid, holes.placed.holes, console.progress);
+    const CarveResult rock = carve(*base.grid, holes.placed.holes, console.progress);
+    const CarvedVolume carved = carved_volume(*base.grid, *rock.rock);
     report_stage(console.progress, "cleaning");
-    const CleanResult cleaned = clean(*carved.rock, cleaning, console.progress);
+    const CleanResult cleaned = clean(*rock.rock, cleaning, console.progress);
     const std::string recipe = format_recipe(clean_node(difference_node(base.node, holes.node),
                                                         cleaning.n_pieces, cleaning.fill_bubbles),
                                              base.measure.voxel_m, args.placement.seed.value_or(0));
     const std::size_t n_missed = count_missing(holes.placed.holes, *base.grid);
-    tell(args, holes, carved, cleaned, n_missed, console);
+    tell(args, holes, rock.n_unresolved, carved, cleaned, n_missed, console);
     auto json = write_solid(args.out, *cleaned.solid, recipe, args.surface, console);
     json["holes"] = holes.placed.holes.size();
-    json["unresolved"] = carved.n_unresolved;
+    json["unresolved"] = rock.n_unresolved;
     json["base_m3"] = carved.base_m3;
     json["removed_m3"] = carved.removed_m3;
     json["missed"] = n_missed;

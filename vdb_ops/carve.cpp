@@ -22,11 +22,15 @@ CarveResult carve(const openvdb::FloatGrid& rock, std::span<const Sphere> holes,
     result.rock = rasterize(difference, lattice, progress);
     for (const Sphere& hole : holes)
         result.n_unresolved += hole.radius_m < 1.5 * lattice.voxel_m;
-    result.base_m3 = volume_m3(rock);
-    result.removed_m3 = result.base_m3 - volume_m3(*result.rock);
-    if (std::fabs(result.removed_m3) < 1e-12 * result.base_m3)
-        result.removed_m3 = 0; // the two sums are over other leaves
     return result;
+}
+
+CarvedVolume carved_volume(const openvdb::FloatGrid& base, const openvdb::FloatGrid& rock) {
+    CarvedVolume volume{volume_m3(base), 0};
+    volume.removed_m3 = volume.base_m3 - volume_m3(rock);
+    if (std::fabs(volume.removed_m3) < 1e-12 * volume.base_m3)
+        volume.removed_m3 = 0; // the two sums are over other leaves
+    return volume;
 }
 
 } // namespace taihu

@@ -33,6 +33,8 @@ public:
     }
     /// Winding number of `shell` at a voxel.
     int winding(const openvdb::Coord& voxel, std::uint32_t shell) const;
+    /// The same for the 8 voxels from `voxel` up along z, held to +-100.
+    void winding_row(const openvdb::Coord& voxel, std::uint32_t shell, std::int8_t* out) const;
     /// The shell is passed through twice in the same direction somewhere: it crosses itself.
     bool overlaps_itself(std::uint32_t shell) const { return overlaps_[shell] != 0; }
 

@@ -1,6 +1,6 @@
 #include "vdb_ops/csg_field.h"
 
-#include "vdb_ops/kernels_detail.h"
+#include <algorithm>
 
 namespace taihu {
 namespace {
@@ -18,7 +18,8 @@ struct Side {
 
 class DifferenceBlock final : public BlockSampler {
 public:
-    DifferenceBlock(Side a, Side b) : a_(std::move(a)), b_(std::move(b)) {}
+    DifferenceBlock(Side a, Side b, float half_width)
+        : a_(std::move(a)), b_(std::move(b)), half_width_(half_width) {}
 
     Cover cover(const Coord& leaf) const override {
         const Cover b = b_.cover(leaf);
@@ -31,49 +32,47 @@ public:
     }
 
     void values(const Coord& leaf, float* out) override {
-        const Cover a = a_.cover(leaf), b = b_.cover(leaf);
-        if (b != Cover::surface) {
+        if (a_.cover(leaf) == Cover::surface)
             a_.sampler->values(leaf, out);
-            return;
-        }
-        alignas(64) float holes[512];
-        b_.sampler->values(leaf, holes);
-        if (a != Cover::surface) {
-            for (int i = 0; i < 512; ++i)
-                out[i] = -holes[i];
-            return;
-        }
-        alignas(64) float base[512];
-        a_.sampler->values(leaf, base);
-        subtract_values(base, holes, out);
+        else
+            std::fill(out, out + 512, -half_width_);
+        if (b_.cover(leaf) == Cover::surface)
+            b_.sampler->subtract_from(leaf, out);
+    }
+
+    const Leaf* stored(const Coord& leaf) const override {
+        return a_.sampler && b_.cover(leaf) == Cover::outside ? a_.sampler->stored(leaf) : nullptr;
     }
 
 private:
     Side a_, b_;
+    float half_width_;
 };
 
 class LatticeDifference final : public LatticeField {
 public:
-    LatticeDifference(std::unique_ptr<LatticeField> a, std::unique_ptr<LatticeField> b)
-        : a_(std::move(a)), b_(std::move(b)) {}
+    LatticeDifference(std::unique_ptr<LatticeField> a, std::unique_ptr<LatticeField> b,
+                      float half_width)
+        : a_(std::move(a)), b_(std::move(b)), half_width_(half_width) {}
     openvdb::CoordBBox bounds() const override { return a_->bounds(); }
     std::unique_ptr<BlockSampler> open(const Coord& block, Cover& cover) const override {
-        Side b(*b_, block);
-        if (!b.sampler && b.whole == Cover::inside) {
+        Side a(*a_, block);
+        if (!a.sampler && a.whole == Cover::outside) {
             cover = Cover::outside;
             return nullptr;
         }
-        Side a(*a_, block);
-        if (!a.sampler && (a.whole == Cover::outside || !b.sampler)) {
-            cover = a.whole;
-            return nullptr;
+        Side b(*b_, block);
+        if (!b.sampler) {
+            cover = b.whole == Cover::inside ? Cover::outside : a.whole;
+            return b.whole == Cover::inside ? nullptr : std::move(a.sampler);
         }
         cover = Cover::surface;
-        return std::make_unique<DifferenceBlock>(std::move(a), std::move(b));
+        return std::make_unique<DifferenceBlock>(std::move(a), std::move(b), half_width_);
     }
 
 private:
     std::unique_ptr<LatticeField> a_, b_;
+    float half_width_;
 };
 
 } // namespace
@@ -85,7 +84,7 @@ std::unique_ptr<LatticeField> DifferenceField::on(const Lattice& lattice,
                                                   const openvdb::CoordBBox& region) const {
     auto a = a_->on(lattice, region);
     auto b = b_->on(lattice, a->bounds()); // what lies outside of a takes nothing away
-    return std::make_unique<LatticeDifference>(std::move(a), std::move(b));
+    return std::make_unique<LatticeDifference>(std::move(a), std::move(b), lattice.half_width_vox);
 }
 
 } // namespace taihu

@@ -18,18 +18,25 @@ struct Lattice {
 /// one side, or perhaps near it.
 enum class Cover { outside, inside, surface };
 
-/// A field inside one block of 64^3 voxels, for one thread.
+/// A field inside one block of 64^3 voxels, for one thread. Leaves are cubes of 8^3 voxels, named
+/// by their first voxel; their 512 values run z fastest.
 class BlockSampler {
 public:
+    using Leaf = openvdb::FloatTree::LeafNodeType;
     static constexpr int kBlock = 64; ///< voxels along an edge of a block
     static constexpr int kLeaf = 8;   ///< and of a leaf
 
     virtual ~BlockSampler() = default;
-    /// Conservative and cheap; `leaf` is the first voxel of a leaf of this block.
+    /// Conservative and cheap; `leaf` lies in this block.
     virtual Cover cover(const openvdb::Coord& leaf) const = 0;
-    /// The 512 signed distances of a leaf in voxels, clamped to the half width, negative inside,
-    /// z fastest; meaningful for leaves whose cover() is `surface`.
+    /// The signed distances of a leaf whose cover() is `surface` [voxels], negative inside. Beyond
+    /// the half width any value beyond it will do.
     virtual void values(const openvdb::Coord& leaf, float* out) = 0;
+    /// values = max(values, -own values): takes this solid away from another, for a leaf whose
+    /// cover() is `surface`.
+    virtual void subtract_from(const openvdb::Coord& leaf, float* values);
+    /// The leaf of a level set on this very lattice [m] that values() would only repeat, or null.
+    virtual const Leaf* stored(const openvdb::Coord& leaf) const;
 };
 
 /// A field prepared for one lattice. Thread-safe.

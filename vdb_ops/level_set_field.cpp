@@ -1,9 +1,10 @@
 #include "vdb_ops/level_set_field.h"
 
-#include <algorithm>
 #include <cmath>
+#include <vector>
 
 #include "stats/core/error.h"
+#include "vdb_ops/leaf_detail.h"
 #include "vdb_ops/rasterize.h"
 
 namespace taihu {
@@ -11,48 +12,75 @@ namespace {
 
 using openvdb::Coord;
 
+using Node = openvdb::FloatTree::RootNodeType::ChildNodeType::ChildNodeType; // 16^3 leaves
+
+Cover tile_side(float value) {
+    return value < 0 ? Cover::inside : Cover::outside;
+}
+
 class LevelSetBlock final : public BlockSampler {
 public:
-    LevelSetBlock(const openvdb::FloatGrid& grid, const Lattice& lattice)
-        : accessor_(grid.getConstAccessor()), half_width_(lattice.half_width_vox),
-          inverse_voxel_(static_cast<float>(1 / lattice.voxel_m)) {}
+    LevelSetBlock(const Node& node, float half_width, float inverse_voxel)
+        : node_(node), half_width_(half_width), inverse_voxel_(inverse_voxel) {}
 
     Cover cover(const Coord& leaf) const override {
-        if (accessor_.probeConstLeaf(leaf))
-            return Cover::surface;
-        return accessor_.getValue(leaf) < 0 ? Cover::inside : Cover::outside;
+        const openvdb::Index i = Node::coordToOffset(leaf);
+        return node_.isChildMaskOn(i) ? Cover::surface : tile_side(node_.getTable()[i].getValue());
     }
 
     void values(const Coord& leaf, float* out) override {
-        // Inactive voxels lie beyond the band; their values may round to a little less.
-        const auto& in = *accessor_.probeConstLeaf(leaf);
-        for (openvdb::Index i = 0; i < 512; ++i)
-            out[i] = in.isValueOn(i)
-                         ? std::clamp(in.getValue(i) * inverse_voxel_, -half_width_, half_width_)
-                         : std::copysign(half_width_, in.getValue(i));
+        const Leaf& in = *stored(leaf);
+        take_values(in.buffer().data(), active_bits(in), half_width_, inverse_voxel_, out);
+    }
+
+    const Leaf* stored(const Coord& leaf) const override {
+        return node_.getTable()[Node::coordToOffset(leaf)].getChild();
     }
 
 private:
-    openvdb::FloatGrid::ConstAccessor accessor_;
+    const Node& node_;
     float half_width_, inverse_voxel_;
 };
 
 class LatticeLevelSet final : public LatticeField {
 public:
     LatticeLevelSet(const openvdb::FloatGrid& grid, const Lattice& lattice)
-        : grid_(grid), lattice_(lattice) {
+        : tree_(grid.tree()), half_width_(lattice.half_width_vox),
+          inverse_voxel_(static_cast<float>(1 / lattice.voxel_m)) {
         // Leaves, not active voxels: a leaf's box is what the blocks have to cover.
-        grid.tree().evalLeafBoundingBox(box_);
+        std::vector<const Node*> nodes;
+        tree_.getNodes(nodes);
+        for (const Node* node : nodes)
+            for (auto leaf = node->cbeginChildOn(); leaf; ++leaf)
+                box_.expand(leaf.getCoord(), BlockSampler::kLeaf);
     }
     openvdb::CoordBBox bounds() const override { return box_; }
-    std::unique_ptr<BlockSampler> open(const Coord&, Cover& cover) const override {
-        cover = Cover::surface;
-        return std::make_unique<LevelSetBlock>(grid_, lattice_);
+
+    std::unique_ptr<BlockSampler> open(const Coord& block, Cover& cover) const override {
+        const Node* node = tree_.probeConstNode<Node>(block);
+        cover = node ? cover_of(*node, block) : tile_side(tree_.getValue(block));
+        if (cover != Cover::surface)
+            return nullptr;
+        return std::make_unique<LevelSetBlock>(*node, half_width_, inverse_voxel_);
     }
 
 private:
-    const openvdb::FloatGrid& grid_;
-    Lattice lattice_;
+    static Cover cover_of(const Node& node, const Coord& block) {
+        constexpr int kAcross = BlockSampler::kBlock / BlockSampler::kLeaf;
+        const openvdb::Index first = Node::coordToOffset(block);
+        const Cover side = tile_side(node.getTable()[first].getValue());
+        for (openvdb::Index i = 0; i < kAcross; ++i)
+            for (openvdb::Index j = 0; j < kAcross; ++j)
+                for (openvdb::Index k = 0; k < kAcross; ++k) {
+                    const openvdb::Index n = first + ((i * 16 + j) * 16 + k);
+                    if (node.isChildMaskOn(n) || tile_side(node.getTable()[n].getValue()) != side)
+                        return Cover::surface;
+                }
+        return side;
+    }
+
+    const openvdb::FloatTree& tree_;
+    float half_width_, inverse_voxel_;
     openvdb::CoordBBox box_;
 };
 

@@ -11,6 +11,7 @@
 #include "stats/core/error.h"
 #include "vdb_ops/columns_detail.h"
 #include "vdb_ops/kernels_detail.h"
+#include "vdb_ops/rounding_detail.h"
 
 namespace taihu {
 namespace {
@@ -20,12 +21,18 @@ using openvdb::CoordBBox;
 constexpr int kBlock = BlockSampler::kBlock;
 constexpr int kLeaf = BlockSampler::kLeaf;
 constexpr int kAcross = kBlock / kLeaf;
-constexpr float kOnSurface = 1e-5f; // voxels; distances carry errors of about 2e-6
 constexpr std::size_t kLeaves = std::size_t{kAcross} * kAcross * kAcross;
 
-LeafTriangle leaf_triangle(const std::array<Vec3, 3>& p, std::uint32_t shell, float half_width) {
+/// Face `face` of a closed mesh. Each edge is passed as often from its lower vertex to its higher
+/// one as back, so one direction is enough to measure the distance to it; with the lowest vertex
+/// first these are the first edge, and the second one or not.
+LeafTriangle leaf_triangle(Triangle face, const std::vector<Vec3>& points, std::uint32_t shell,
+                           float half_width) {
+    std::rotate(face.begin(), std::min_element(face.begin(), face.end()), face.end());
+    const std::array<Vec3, 3> p = {points[face[0]], points[face[1]], points[face[2]]};
     LeafTriangle t;
     t.shell = shell;
+    t.n_edges = face[1] < face[2] ? 2 : 1;
     const std::array<Vec3, 3> e = {p[1] - p[0], p[2] - p[1], p[0] - p[2]};
     Vec3 n = cross(e[0], e[1]);
     const double longest2 =
@@ -62,39 +69,39 @@ void each_cell(const LeafTriangle& t, int size, const Coord& first, const Coord&
                float half_width, Fn&& fn) {
     int lo[3], hi[3];
     for (int c = 0; c < 3; ++c) {
-        const double from = std::floor(std::ceil(t.lo[c]) / size) - first[c];
-        const double to = std::floor(std::floor(t.hi[c]) / size) - first[c];
-        lo[c] = static_cast<int>(std::max(0.0, from));
-        hi[c] = static_cast<int>(std::min(n[c] - 1.0, to));
+        lo[c] = std::max(0, floor_int(ceil_int(t.lo[c]) / double(size)) - first[c]);
+        hi[c] = std::min(n[c] - 1, floor_int(floor_int(t.hi[c]) / double(size)) - first[c]);
     }
+    // Linear in the middle of a cell, and small enough where the cell may come near the face: the
+    // distance to its plane, both ways, and that beyond each edge in the plane (long thin faces
+    // would fill their box otherwise).
     const double half = 0.5 * (size - 1);
     const double reach =
         half * (std::fabs(t.n[0]) + std::fabs(t.n[1]) + std::fabs(t.n[2])) + half_width + 1e-3;
-    const auto middle = [&](int c, int i) {
-        return (first[c] + i) * static_cast<double>(size) + half - t.corner[0][c];
-    };
     // Normals of edges are floats: off by 1e-7 of the face's extent.
     const double extent = std::max({t.hi[0] - t.lo[0], t.hi[1] - t.lo[1], t.hi[2] - t.lo[2]});
     const double edge_reach = std::sqrt(3.0) * half + half_width + 0.01 + 1e-6 * extent;
-    // Beyond an edge in the plane: long thin faces would fill their box otherwise.
-    const auto beyond_an_edge = [&](double x, double y, double z) {
-        for (std::size_t e = 0; e < 3; ++e) {
-            const Vec3 from{t.corner[e][0] - t.corner[0][0], t.corner[e][1] - t.corner[0][1],
-                            t.corner[e][2] - t.corner[0][2]};
-            const double side =
-                t.en[e][0] * (x - from.x) + t.en[e][1] * (y - from.y) + t.en[e][2] * (z - from.z);
-            const double edge = 1 / std::sqrt(static_cast<double>(t.inverse_e2[e]));
-            if (side < -edge_reach * edge)
-                return true;
-        }
-        return false;
+    double edge_limit[3], from[3][3]; // corners from the middle of the first cell
+    for (std::size_t e = 0; e < 3; ++e) {
+        edge_limit[e] = -edge_reach / std::sqrt(static_cast<double>(t.inverse_e2[e]));
+        for (int c = 0; c < 3; ++c)
+            from[e][c] = first[c] * static_cast<double>(size) + half - t.corner[e][c];
+    }
+    const auto near = [&](double x, double y, double z) {
+        if (std::fabs(t.n[0] * (x + from[0][0]) + t.n[1] * (y + from[0][1]) +
+                      t.n[2] * (z + from[0][2])) > reach)
+            return false;
+        for (std::size_t e = 0; e < 3; ++e)
+            if (t.en[e][0] * (x + from[e][0]) + t.en[e][1] * (y + from[e][1]) +
+                    t.en[e][2] * (z + from[e][2]) <
+                edge_limit[e])
+                return false;
+        return true;
     };
     for (int i = lo[0]; i <= hi[0]; ++i)
         for (int j = lo[1]; j <= hi[1]; ++j)
             for (int k = lo[2]; k <= hi[2]; ++k)
-                if (std::fabs(t.n[0] * middle(0, i) + t.n[1] * middle(1, j) +
-                              t.n[2] * middle(2, k)) <= reach &&
-                    !beyond_an_edge(middle(0, i), middle(1, j), middle(2, k)))
+                if (near(i * size, j * size, k * size))
                     fn(i, j, k);
 }
 
@@ -182,28 +189,16 @@ private:
 
     void shell_distance(const Coord& leaf, std::uint32_t shell, const std::uint32_t* face,
                         const std::uint32_t* end, float* out) const {
-        std::int8_t winding[512] = {};
+        std::int8_t winding[512];
         for (int x = 0; x < kLeaf; ++x)
-            for (int y = 0; y < kLeaf; ++y) {
-                const int cx = leaf.x() + x, cy = leaf.y() + y;
-                std::int8_t* row = winding + x * 64 + y * 8;
-                for (auto hit = data_.columns->begin(cx, cy); hit != data_.columns->end(cx, cy);
-                     ++hit)
-                    for (int z = std::max(0, hit->z - leaf.z()); hit->shell == shell && z < kLeaf;
-                         ++z)
-                        row[z] =
-                            static_cast<std::int8_t>(std::clamp(row[z] + hit->sign, -100, 100));
-            }
+            for (int y = 0; y < kLeaf; ++y)
+                data_.columns->winding_row(leaf.offsetBy(x, y, 0), shell, winding + x * 64 + y * 8);
         const float w = data_.half_width;
-        std::fill(out, out + 512, w * w);
+        alignas(64) float squared[512];
+        std::fill(squared, squared + 512, w * w);
         min_triangles(data_.triangles.data(), face, end, leaf.data(), w,
-                      data_.columns->overlaps_itself(shell) ? winding : nullptr, out);
-        for (int i = 0; i < 512; ++i) {
-            // Voxels on the surface all take one side, whatever the last bit says: crumbs
-            // otherwise.
-            const float d = std::sqrt(out[i]);
-            out[i] = d < kOnSurface ? 0 : winding[i] != 0 ? -d : d;
-        }
+                      data_.columns->overlaps_itself(shell) ? winding : nullptr, squared);
+        signed_roots(squared, winding, out);
     }
 
     const LatticeMeshData& data_;
@@ -271,9 +266,8 @@ private:
         tbb::parallel_for(
             tbb::blocked_range<std::size_t>(0, mesh.triangles.size(), 256), [&](const auto& range) {
                 for (std::size_t i = range.begin(); i < range.end(); ++i) {
-                    const Triangle& t = mesh.triangles[i];
-                    data_.triangles[i] = leaf_triangle({points[t[0]], points[t[1]], points[t[2]]},
-                                                       mesh.shell_of[i], data_.half_width);
+                    data_.triangles[i] = leaf_triangle(mesh.triangles[i], points, mesh.shell_of[i],
+                                                       data_.half_width);
                 }
             });
     }

@@ -37,6 +37,11 @@ std::string human_bytes(double bytes) {
     return text;
 }
 
+/// At the peak, roughly: within a factor of two above 100 MB.
+double estimated_bytes(double area_m2, double voxel_m) {
+    return area_m2 / (voxel_m * voxel_m) * kLeavesPerVoxel2 * kBytesPerLeaf;
+}
+
 bool any_inside(const openvdb::FloatGrid& solid) {
     for (auto leaf = solid.tree().cbeginLeaf(); leaf; ++leaf)
         for (openvdb::Index v = 0; v < 512; ++v)
@@ -57,10 +62,6 @@ double voxel_for(const Box& box, int dim) {
     if (!(longest > 0) || !std::isfinite(longest))
         throw Error(Fault::bad_argument, "dim: the solid has no extent; give one that has");
     return longest / dim;
-}
-
-double estimated_bytes(double area_m2, double voxel_m) {
-    return area_m2 / (voxel_m * voxel_m) * kLeavesPerVoxel2 * kBytesPerLeaf;
 }
 
 void refuse_if_too_large(double area_m2, const Box& box, double voxel_m) {

@@ -31,12 +31,9 @@ VoxelizeResult voxelize(const TriMesh& mesh, const std::string& where,
 double voxel_for(const Box& box, int dim);
 
 /// Refuse what cannot fit before any work: a level set of `area_m2` at `voxel_m`, and what is made
-/// of it. \throws Error unsupported: `refused: ...`, with what it would need and the voxel size
-/// that fits.
+/// of it.
+///
+/// \throws Error unsupported: `refused: ...`, with what it would need and the voxel size that fits.
 void refuse_if_too_large(double area_m2, const Box& box, double voxel_m);
-
-/// Bytes that a level set of `area_m2` needs at its peak, roughly (within a factor of two above 100
-/// MB).
-double estimated_bytes(double area_m2, double voxel_m);
 
 } // namespace taihu

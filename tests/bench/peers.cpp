@@ -1,3 +1,8 @@
+// The peers are compiled here, with the flags of this project: what the library's package holds was
+// built with others.
+#include <openvdb/version.h>
+#undef OPENVDB_USE_EXPLICIT_INSTANTIATION
+
 #include "tests/bench/peers.h"
 
 #include <openvdb/tools/Composite.h>

@@ -51,8 +51,8 @@ void expect_predicted(const Law& law, double n_v) {
         Placement placement;
         placement.density_m3 = n_v;
         placement.seed = seed;
-        const CarveResult made = carve(*base, place_holes(law, placement, *base).holes);
-        const double p = made.porosity(), s = surface_per_volume(*made.rock);
+        const auto rock = carve(*base, place_holes(law, placement, *base).holes).rock;
+        const double p = carved_volume(*base, *rock).porosity(), s = surface_per_volume(*rock);
         porosity += p / kSeeds, porosity2 += p * p / kSeeds;
         s_v += s / kSeeds, s_v2 += s * s / kSeeds;
     }

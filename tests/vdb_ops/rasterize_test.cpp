@@ -2,8 +2,10 @@
 
 #include <tbb/global_control.h>
 
+#include "stats/core/rng.h"
 #include "tests/support/errors.h"
 #include "tests/support/grids.h"
+#include "vdb_ops/csg_field.h"
 #include "vdb_ops/level_set_field.h"
 
 namespace taihu {
@@ -58,6 +60,62 @@ TEST(Rasterize, RefusesLatticesOutOfRange) {
     expect_error(Fault::bad_argument, "1.5e-5 m", [&] { rasterize(field, {1e-10, {}, 3}); });
 }
 
+/// Expects two fields to say the same in a block, and returns how many leaves have a surface.
+int expect_same_block(const LatticeField& a, const LatticeField& b, const openvdb::Coord& block) {
+    Cover cover_a{}, cover_b{};
+    const auto in_a = a.open(block, cover_a), in_b = b.open(block, cover_b);
+    EXPECT_EQ(cover_a, cover_b);
+    int n_surface = 0;
+    for (int i = 0; in_a && in_b && i < 512; ++i) {
+        const openvdb::Coord leaf = block.offsetBy(i / 64 * 8, i / 8 % 8 * 8, i % 8 * 8);
+        EXPECT_EQ(in_a->cover(leaf), in_b->cover(leaf));
+        if (in_a->cover(leaf) != Cover::surface)
+            continue;
+        std::vector<float> values_a(512), values_b(512);
+        in_a->values(leaf, values_a.data());
+        in_b->values(leaf, values_b.data());
+        EXPECT_EQ(values_a, values_b);
+        ++n_surface;
+    }
+    return n_surface;
+}
+
+TEST(DifferenceField, ABlockAloneEqualsTheSameBlockOfTheWhole) {
+    std::vector<Sphere> holes;
+    for (std::uint64_t i = 0; i < 2000; ++i) {
+        const Rng rng{2, 2};
+        holes.push_back(
+            {{2 * rng.uniform(i, 0) - 1, 2 * rng.uniform(i, 1) - 1, 2 * rng.uniform(i, 2) - 1},
+             0.15 * rng.uniform(i, 3)});
+    }
+    const DifferenceField field(std::make_shared<BallsField>(std::array<Sphere, 1>{{{{}, 1}}}),
+                                std::make_shared<BallsField>(holes));
+    const Lattice lattice{0.01, {}, 3};
+    const auto whole = field.on(lattice, openvdb::CoordBBox::inf());
+    for (const openvdb::Coord block : {openvdb::Coord(0), {64, -64, 0}, {-128, 0, 64}}) {
+        const auto alone = field.on(lattice, openvdb::CoordBBox::createCube(block, 64));
+        EXPECT_GT(expect_same_block(*whole, *alone, block), 10);
+        // A region that only touches the block opens all of it.
+        const auto touched = field.on(lattice, openvdb::CoordBBox::createCube(block, 1));
+        EXPECT_GT(expect_same_block(*whole, *touched, block), 10);
+    }
+}
+
+TEST(BallsField, BallsFarApartAreFoundAllTheSame) {
+    // Blocks of 64^3 would be 3e9 here.
+    const Sphere near{{10, 20, 30}, 5}, far{{90000, 90000, 90000}, 700};
+    const BallsField both(std::array<Sphere, 2>{near, far});
+    const Lattice lattice{1, {}, 3};
+    const auto all = both.on(lattice, openvdb::CoordBBox::inf());
+    const BallsField only_near(std::array<Sphere, 1>{near}), only_far(std::array<Sphere, 1>{far});
+    EXPECT_GT(expect_same_block(*all, *only_near.on(lattice, openvdb::CoordBBox::inf()),
+                                openvdb::Coord(0)),
+              3);
+    EXPECT_GT(expect_same_block(*all, *only_far.on(lattice, openvdb::CoordBBox::inf()),
+                                openvdb::Coord(89984, 89984, 90688)),
+              50);
+}
+
 TEST(LevelSetField, GivesItsOwnGridBack) {
     const auto grid = ball_rock();
     EXPECT_EQ(grid_hash(*rasterize(LevelSetField(grid), lattice_of(*grid))), grid_hash(*grid));
@@ -68,7 +126,8 @@ TEST(LevelSetField, BandsStayBandsAtAnyVoxelSize) {
         const auto grid = ball_rock(1, voxel);
         const auto again = rasterize(LevelSetField(grid), lattice_of(*grid));
         EXPECT_EQ(again->activeVoxelCount(), grid->activeVoxelCount()) << voxel;
-        for (auto it = grid->cbeginValueOn(); it; ++it) // to voxels and back: the last bit of a float
+        for (auto it = grid->cbeginValueOn(); it;
+             ++it) // to voxels and back: the last bit of a float
             ASSERT_NEAR(again->tree().getValue(it.getCoord()), *it, 1e-6 * voxel);
     }
 }
