@@ -12,13 +12,15 @@ enum class Combine {
     subtract   ///< in the first and in none of the others
 };
 
-/// Fields combined: the least, or the greatest, of their distances; with `blend_m` the seams are
-/// rounded by smooth_min() of that width, within that distance of both surfaces and nowhere else.
-/// The order of the operands (of those after the first, when they are subtracted) changes no bit.
+/// Fields combined: the least, or the greatest, of their distances. With `blend_m` the seams are
+/// rounded by smooth_min() of that width (those between solids that are taken away, too): only
+/// where two surfaces are within `blend_m` of each other. The order of the operands (of those after
+/// the first, when they are subtracted) changes no bit.
 ///
-/// Distances of the result never over-estimate and are 1-Lipschitz where those of the operands are;
-/// beyond the seams' edges (outside a union's notch, inside an intersection's edge) they are exact
-/// where the operands' are, elsewhere a bound: redistance() makes them true.
+/// The result is 1-Lipschitz and never over-estimates, where that holds for the operands. It is
+/// exact, where they are, outside of a sharp union and inside of a sharp intersection or
+/// difference; on the other side, near seams, and in blends it is a bound: redistance() makes it
+/// true.
 ///
 /// Where one operand decides a block or a leaf, the others are not evaluated there, and where one
 /// alone is near, its values are handed on. For blending, operands are also asked on a band wider
@@ -39,7 +41,7 @@ private:
     double blend_m_;
 };
 
-/// A smooth minimum of any number of values: min over weights w_i >= 0 with sum 1 of
+/// A smooth minimum of one value or more: min over weights w_i >= 0 with sum 1 of
 /// sum w_i v_i - (k / 2) (1 - sum w_i^2). Symmetric, so that the order of the values changes no
 /// bit; once differentiable; 1-Lipschitz, as its gradient is w; equal to the least value when all
 /// others are at least `k` above it. Of two values it is the usual quadratic

@@ -15,7 +15,6 @@ namespace {
 using openvdb::Coord;
 using openvdb::CoordBBox;
 constexpr int kLeaf = BlockSampler::kLeaf;
-constexpr double kMostWidth_vox = 1000; // of widen_band()
 
 /// Voxel (i, j, k) of a lattice lies at first + i step[0] + j step[1] + k step[2] of the grid.
 struct Frame {
@@ -48,10 +47,11 @@ struct Frame {
     }
 };
 
-Coord below(const Vec3& p) { // grids reach to 2^31, what is asked for may lie beyond
+Coord below(const Vec3& p) { // rasterize() refuses what reaches beyond 2^30
+    constexpr double kFar = 0x1p30 + 1;
     Coord c;
     for (int axis = 0; axis < 3; ++axis)
-        c[axis] = static_cast<int>(std::floor(std::clamp(p[axis], -0x1p30, 0x1p30)));
+        c[axis] = static_cast<int>(std::floor(std::clamp(p[axis], -kFar, kFar)));
     return c;
 }
 
@@ -182,7 +182,7 @@ std::unique_ptr<LatticeField> PlacedLevelSetField::on(const Lattice& lattice,
     const double half_width =
         static_cast<double>(lattice.half_width_vox) / frame.voxel + (same ? 0 : 2);
     auto grid = grid_;
-    if (half_width > kMostWidth_vox)
+    if (half_width > kWidestBand_vox)
         throw Error(Fault::bad_argument,
                     "grid '" + grid_->getName() + "': a band of " + rounded(half_width) +
                         " of its voxels is asked for, at most 1000 are handled; use a smaller "

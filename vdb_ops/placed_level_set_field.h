@@ -14,8 +14,8 @@ namespace taihu {
 /// lattice and not placed, the grid's values are handed on as they stand.
 ///
 /// Details finer than a voxel of the lattice are aliased: sample a fine level set on a lattice not
-/// much coarser. on() costs the widened band, of half width / (grid's voxel in the lattice's
-/// voxels) + 2 of the grid's voxels; blocks are then random access.
+/// much coarser. on() makes the widened band, of the half width asked for plus 2 of the grid's own
+/// voxels, and keeps it; blocks are then random access.
 class PlacedLevelSetField final : public Field {
 public:
     /// \throws Error bad_argument: null, or as lattice_of().

@@ -22,7 +22,6 @@ using openvdb::Coord;
 using openvdb::FloatGrid;
 using Leaf = openvdb::FloatTree::LeafNodeType;
 constexpr std::size_t kMostLeaves = std::size_t{1} << 22;
-constexpr float kMostWidth_vox = 1000;
 constexpr float kEnough = 1e-5f; // voxels: smaller improvements are not passed on
 constexpr float kChord = 0.06f;  // voxels: 3 / 8r, at a radius of curvature of 6
 
@@ -400,11 +399,17 @@ std::vector<BandLeaf> sources(const FloatGrid& grid, double voxel_m, float cap, 
 FloatGrid::Ptr solved(const FloatGrid& grid, float half_width, bool widen, Progress* progress) {
     const Lattice lattice = lattice_of(grid);
     const float least = widen ? lattice.half_width_vox : 2;
-    if (!(half_width >= least * 0.999f && half_width <= kMostWidth_vox))
+    if (!(half_width >= least * 0.999f && half_width <= kWidestBand_vox))
         throw Error(Fault::bad_argument, "redistance: half_width_vox is " +
                                              rounded(static_cast<double>(half_width)) +
                                              ", must be " + rounded(static_cast<double>(least)) +
                                              "..1000; choose one in that range");
+    openvdb::CoordBBox box;
+    const Coord most(1 << 30);
+    if (grid.tree().evalLeafBoundingBox(box) && !openvdb::CoordBBox(-most, most).isInside(box))
+        throw Error(Fault::bad_argument, "grid '" + grid.getName() +
+                                             "': it reaches beyond voxel 2^30; use a larger voxel, "
+                                             "or move the solid nearer to the origin");
     Band band(grid, half_width);
     band.add(sources(grid, lattice.voxel_m, half_width + 1, widen));
     band.solve(progress);

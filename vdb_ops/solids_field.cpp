@@ -143,8 +143,8 @@ public:
         if (solids_.empty())
             return;
         for (int axis = 0; axis < 3; ++axis) {
-            box_.min()[axis] = below(box.lo[axis] - half_width_, kFar + 1);
-            box_.max()[axis] = below(box.hi[axis] + half_width_, kFar) + 1;
+            box_.min()[axis] = below(box.lo[axis] - half_width_);
+            box_.max()[axis] = below(box.hi[axis] + half_width_) + 1;
         }
         for (std::uint32_t i = 0; i < solids_.size(); ++i)
             list(i);
@@ -184,8 +184,8 @@ public:
 private:
     static constexpr int kLevels = 24;
 
-    static int below(double p, double far) {
-        return static_cast<int>(std::floor(std::clamp(p, -far, far)));
+    static int below(double p) {
+        return static_cast<int>(std::floor(std::clamp(p, -kFar - 1, kFar + 1)));
     }
     /// Cells 2^19 apart share a key; their solids are told apart by distance.
     static std::uint64_t cell_key(int level, int x, int y, int z) {
@@ -193,10 +193,14 @@ private:
         return static_cast<std::uint64_t>(level) << 57 | part(x) << 38 | part(y) << 19 | part(z);
     }
     bool misses(const VoxelSolid& solid, const CoordBBox& region) const {
-        for (int axis = 0; axis < 3; ++axis) // blocks that touch the region are opened whole
-            if (solid.hi[axis] + half_width_ < region.min()[axis] - double(kBlock) ||
-                solid.lo[axis] - half_width_ > region.max()[axis] + double(kBlock))
+        for (int axis = 0; axis < 3; ++axis) { // blocks that touch the region are opened whole
+            // An unbounded region misses nothing, however far: rasterize() is to refuse it.
+            const double lo = std::min(solid.lo[axis] - half_width_, kFar + 1),
+                         hi = std::max(solid.hi[axis] + half_width_, -kFar - 1);
+            if (hi < region.min()[axis] - double(kBlock) ||
+                lo > region.max()[axis] + double(kBlock))
                 return true;
+        }
         return false;
     }
 
@@ -207,8 +211,8 @@ private:
         const VoxelSolid& s = solids_[i];
         Coord lo, hi;
         for (int axis = 0; axis < 3; ++axis) {
-            lo[axis] = below(s.lo[axis] - half_width_, kFar);
-            hi[axis] = below(s.hi[axis] + half_width_, kFar) + 1;
+            lo[axis] = below(s.lo[axis] - half_width_);
+            hi[axis] = below(s.hi[axis] + half_width_) + 1;
         }
         const auto spans = [&](int axis, int level) {
             return (hi[axis] >> (6 + level)) - (lo[axis] >> (6 + level));

@@ -169,6 +169,11 @@ TEST(Redistance, RefusesWidthsOutOfRangeAndStops) {
     expect_error(Fault::bad_argument, "must be 3..1000", [&] { widen_band(*grid, 2000); });
     auto fog = openvdb::FloatGrid::create(0);
     expect_error(Fault::bad_argument, "not a level set", [&] { redistance(*fog); });
+    auto far = openvdb::FloatGrid::create(0.3f);
+    far->setTransform(openvdb::math::Transform::createLinearTransform(0.1));
+    far->setGridClass(openvdb::GRID_LEVEL_SET);
+    far->tree().setValueOn(Coord(0, 2147483647, 0), -0.05f);
+    expect_error(Fault::bad_argument, "beyond voxel 2^30", [&] { redistance(*far); });
     Stop stop;
     EXPECT_THROW(redistance(*grid, 3, &stop), Error);
 }

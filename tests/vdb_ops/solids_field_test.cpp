@@ -145,6 +145,19 @@ TEST(SolidsField, AHalfSpaceHasDistancesButNoBounds) {
     expect_error(Fault::bad_argument, "beyond voxel 2^30", [&] { rasterize(half, kLattice); });
 }
 
+TEST(SolidsField, FarAwayIsRefusedWhereItIsRasterizedNotBefore) {
+    for (const double at : {1e9, -1e9, 1e30}) {
+        const SolidsField far({{BallSolid{1}, Similarity::translation({0, at, 0})}});
+        expect_error(Fault::bad_argument, "beyond voxel 2^30", [&] { rasterize(far, kLattice); });
+        EXPECT_GT(sample(far, kLattice, CoordBBox(Coord(0), Coord(9))).at(Coord(3)), 0);
+    }
+    // One as large as all that can be: its surface passes here.
+    const SolidsField huge({{BallSolid{4e7}, Similarity::translation({0, -4e7, 0})}});
+    expect_distances(
+        huge, kLattice, CoordBBox(Coord(-9), Coord(9)), [](const Vec3& p) { return p.y; },
+        1e-5); // doubles of 8e8 voxels: 1e-7
+}
+
 TEST(SolidsField, NamesTheSolidThatIsNone) {
     auto solids = many(3);
     solids.push_back({BallSolid{0}, {}});
