@@ -179,21 +179,25 @@ public:
 
     std::unique_ptr<BlockSampler> open(const Coord& block, Cover& cover) const override {
         const CoordBBox voxels = CoordBBox::createCube(block, BlockSampler::kBlock);
+        const auto meets = [&](const Operand& o) { return o.reach.hasOverlap(voxels); };
         std::vector<OpenOperand> near;
         cover = times(rule_.sign, Cover::inside);
-        for (const Operand& o : operands_) {
-            OpenOperand open{o.sign, nullptr, nullptr};
+        for (const Operand& o : operands_)
+            if (o.sign < 0 && !meets(o))
+                return nullptr;
+        // From the last: where holes cover a block, what they are cut from is not opened.
+        for (auto o = operands_.rbegin(); o != operands_.rend(); ++o) {
+            OpenOperand open{o->sign, nullptr, nullptr};
             Cover c = Cover::outside;
-            const bool meets = o.reach.hasOverlap(voxels);
-            auto sampler = meets ? (o.wide ? o.wide : o.narrow)->open(block, c) : nullptr;
-            if (sampler && o.wide) {
+            auto sampler = meets(*o) ? (o->wide ? o->wide : o->narrow)->open(block, c) : nullptr;
+            if (sampler && o->wide) {
                 open.wide = std::move(sampler);
-                open.narrow = o.narrow->open(block, c);
-                if (!open.narrow && (open.narrow_whole = times(o.sign, c)) == Cover::inside)
+                open.narrow = o->narrow->open(block, c);
+                if (!open.narrow && (open.narrow_whole = times(o->sign, c)) == Cover::inside)
                     return nullptr;
             } else if (sampler) {
                 open.narrow = std::move(sampler);
-            } else if (times(o.sign, c) == Cover::inside) {
+            } else if (times(o->sign, c) == Cover::inside) {
                 return nullptr;
             } else {
                 continue;

@@ -70,14 +70,8 @@ public:
         if (std::fabs(d) > half_width_ + kHalf * std::sqrt(3.0) + 2 * frame_.voxel)
             return side;
         const Vec3 half = frame_.half_extent(kLeaf);
-        const Coord lo = below(middle - half) & ~(kLeaf - 1);
-        const Coord hi = below(middle + half).offsetBy(1);
-        for (int x = lo.x(); x <= hi.x(); x += kLeaf)
-            for (int y = lo.y(); y <= hi.y(); y += kLeaf)
-                for (int z = lo.z(); z <= hi.z(); z += kLeaf)
-                    if (accessor_.probeConstLeaf({x, y, z}))
-                        return Cover::surface;
-        return side;
+        return any_leaf(below(middle - half), below(middle + half).offsetBy(1)) ? Cover::surface
+                                                                                : side;
     }
 
     void values(const Coord& leaf, float* out) override {
@@ -90,6 +84,26 @@ public:
     }
 
 private:
+    using Node = openvdb::FloatTree::RootNodeType::ChildNodeType::ChildNodeType;
+
+    /// Does a box of the grid hold a leaf? Node by node: on a coarse lattice it may be large.
+    bool any_leaf(const Coord& lo, const Coord& hi) const {
+        constexpr int kNode = Node::DIM;
+        for (int x = lo.x() & ~(kNode - 1); x <= hi.x(); x += kNode)
+            for (int y = lo.y() & ~(kNode - 1); y <= hi.y(); y += kNode)
+                for (int z = lo.z() & ~(kNode - 1); z <= hi.z(); z += kNode)
+                    if (const Coord node(x, y, z); accessor_.probeConstNode<Node>(node)) {
+                        const Coord from = Coord::maxComponent(lo, node) & ~(kLeaf - 1);
+                        const Coord to = Coord::minComponent(hi, node.offsetBy(kNode - 1));
+                        for (int i = from.x(); i <= to.x(); i += kLeaf)
+                            for (int j = from.y(); j <= to.y(); j += kLeaf)
+                                for (int k = from.z(); k <= to.z(); k += kLeaf)
+                                    if (accessor_.probeConstLeaf({i, j, k}))
+                                        return true;
+                    }
+        return false;
+    }
+
     /// Distance at a point of the grid, in voxels of the lattice.
     float at(const Vec3& p) const {
         const Coord c = below(p);

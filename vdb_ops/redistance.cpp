@@ -198,7 +198,7 @@ public:
     Band(const FloatGrid& grid, float half_width) : grid_(grid), cap_(half_width + 1) {}
 
     void add(std::vector<BandLeaf> leaves) {
-        for (BandLeaf& leaf : leaves)
+        for (const BandLeaf& leaf : leaves)
             link(leaf);
         leaves_ = std::move(leaves);
         for (std::size_t i = 0; i < leaves_.size(); ++i)
@@ -247,11 +247,8 @@ private:
     Halo gather(const BandLeaf& leaf) const {
         Halo halo;
         halo.fill(cap_);
-        for (int x = 0; x < 8; ++x)
-            for (int y = 0; y < 8; ++y)
-                for (int z = 0; z < 8; ++z)
-                    halo[halo_index(x, y, z)] =
-                        leaf.d[static_cast<std::size_t>(x * 64 + y * 8 + z)];
+        for (int i = 0; i < 512; ++i)
+            halo[halo_index(i / 64, i / 8 % 8, i % 8)] = leaf.d[static_cast<std::size_t>(i)];
         for (int face = 0; face < 6; ++face) {
             const std::int32_t b = leaf.beside[static_cast<std::size_t>(face)];
             if (b < 0)

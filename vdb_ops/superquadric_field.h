@@ -1,4 +1,6 @@
 #pragma once
+#include <string>
+
 #include "stats/core/tri_mesh.h"
 #include "vdb_ops/field.h"
 #include "vdb_ops/similarity.h"

@@ -53,6 +53,14 @@ TEST(PlacedLevelSetField, IsTheMovedSolidOnAnyLattice) {
         }
 }
 
+TEST(PlacedLevelSetField, MayBeMuchFinerThanTheLattice) {
+    const auto grid = ball_on(0.02);
+    // 20 of its voxels make one: its band of 3 is widened to 62. Tolerance as above.
+    expect_distances(
+        PlacedLevelSetField(grid), {0.4, {}, 3}, CoordBBox(Coord(-9), Coord(9)),
+        [&](const Vec3& p) { return distance_m(kBall, p); }, 0.14);
+}
+
 TEST(PlacedLevelSetField, KeepsVolumesAndSlopes) {
     const AnalyticSolid box{BoxSolid{{0.6, 0.4, 0.5}}, Similarity::rotation({0, 1, 0}, 0.3)};
     const auto grid = rasterize(SolidsField({box}), {0.03, {}, 3});
