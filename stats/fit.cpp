@@ -223,7 +223,9 @@ LawRanking::AllLaws number_by_all(std::span<const FitParts> fits, std::span<cons
     n_v.extrapolated_share /= sum;
     n_v.mean = n / area * exposure / squares;
     for (std::size_t i = 0; i < fits.size(); ++i)
-        n_v.sd += weights[i] * std::pow(fits[i].fit.n_v->estimate - n_v.mean, 2);
+        for (const LawPart& part : fits[i].parts)
+            n_v.sd += schwarz[i] * part.weight * prior(1 - part.above) / sum *
+                      std::pow(fits[i].fit.n_v->estimate - n_v.mean, 2);
     n_v.sd = std::sqrt(n_v.sd);
     const NumberPosterior posterior(all_parts(fits, weights), n, area);
     const Interval interval = with(interval_of(posterior, first.level), n_v.mean);

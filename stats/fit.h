@@ -79,8 +79,7 @@ struct LawRanking {
         /// being the share of its holes below the limit: that share is expected to be small unless
         /// the profiles say otherwise. Without a limit it is 0.
         double mean = 0;
-        double sd =
-            0; ///< of the fits' N_V about the mean, by `weights`: what the choice of one does
+        double sd = 0; ///< of the fits' own N_V about it, by the same weights: what choosing does
         /// The interval of that level. It doubts more: by Akaike weights, likelihood and 1 - h.
         double lo = 0, hi = 0;
         double extrapolated_share = 0; ///< the expected h
@@ -96,14 +95,14 @@ inline constexpr std::array kUsualFamilies = {Family::exponential, Family::gamma
 
 /// fit_law of each family; with fewer than 20 profiles only of the exponential, which is noted.
 ///
-/// The 0.14 of AllLaws: averaged over ten laws from exponential to lognormal, with a limit of 0.3
-/// mean diameters, the relative error of N_V is 0.17 at 50 profiles and 0.12 at 200 (of the first
-/// fit: 0.31, 0.18), and 0.12 to 0.18 do as well. The price: where more is hidden the number is
-/// low, for an exponential law with limits of 0.3 and 0.5 mean diameters by 10 and 28 % at 200
-/// profiles. The interval holds the truth there too, but of gamma laws with a shape of 0.7, whose
-/// small holes are without end, in 84 to 95 % (tests/bench/estimators prints all
-/// this). \throws Error as fit_law, when no family could be fitted, that of the first one;
-/// bad_argument:
+/// The 0.14 of AllLaws: averaged over six laws from exponential to lognormal, with a limit of 0.3
+/// mean diameters, the relative error of N_V is 0.21 at 50 profiles and 0.14 at 200 (of the first
+/// fit: 0.48, 0.25), and 0.12 to 0.18 do as well. The price: where more is hidden the number is
+/// low, for an exponential law with limits of 0.3 and 0.5 mean diameters by 10 and 29 % at 200
+/// profiles. The interval of 95 % holds the truth there too; for a gamma law with a shape of 0.7,
+/// whose density is infinite at 0, it does in 84 to 95 %. tests/bench/estimators prints all this.
+///
+/// \throws Error as fit_law, when no family could be fitted, that of the first one; bad_argument:
 ///         no family, or one twice.
 LawRanking fit_laws(const Sample& sample, std::span<const Family> families = kUsualFamilies,
                     const FitSettings& settings = {});

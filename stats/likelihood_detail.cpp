@@ -10,6 +10,11 @@ namespace {
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
+// The logarithm of a density far from its law, where differences of logarithms have no digits left.
+constexpr double kNothing = -1e15;
+// The logarithm of a share of sections below which nothing is said of what is seen: 1e-12.
+constexpr double kUnseen = -27.6;
+
 // Mean of the normal law with sd 1 above 0.
 double truncated_mean(double ratio) {
     return Law(Family::truncated_normal, std::array<double, 2>{ratio, 1}).mean();
@@ -140,6 +145,8 @@ template <class LogDensity>
 UnitSection::Node UnitSection::integrate(double x, LogDensity log_density) {
     const double d = std::exp(x);
     const double greatest = log_density(std::log(std::max(d, mode_)), std::max(d, mode_));
+    if (!(greatest > kNothing))
+        return {kNothing, kNothing};
     const double start = d < lowest_ ? std::acosh(lowest_ / d) / step_ : 0;
     double density = 0, weighted = 0;
     for (auto k = static_cast<std::size_t>(start);; ++k) {
@@ -305,7 +312,12 @@ double Likelihood::log_seen(double log_mean) const {
 
 double Likelihood::operator()(double log_mean, double shape) {
     prepare(log_mean, shape);
-    double sum = constant_ - n_ * log_seen(log_mean) + log_prior(family_, shape);
+    const double seen = log_seen(log_mean);
+    // What follows is then the difference of two large numbers, each with its error. Rising, so
+    // that a search finds its way out.
+    if (!(seen > kUnseen))
+        return kImpossible + std::max(seen, kImpossible);
+    double sum = constant_ - n_ * seen + log_prior(family_, shape);
     for (const Point& p : points_)
         sum += p.count * (section_->log_pdf(p.log_d - log_mean) - log_mean);
     for (const Cell& cell : cells_)
@@ -321,7 +333,7 @@ double Likelihood::seen(double log_mean, double shape) {
 
 double Likelihood::above(double log_mean, double shape) {
     prepare(log_mean, shape);
-    return 1 - section_->law().cdf(detection_->limit() * std::exp(-log_mean));
+    return std::max(1e-16, 1 - section_->law().cdf(detection_->limit() * std::exp(-log_mean)));
 }
 
 } // namespace taihu

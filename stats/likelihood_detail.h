@@ -75,8 +75,8 @@ double log_prior(Family family, double shape);
 /// The log-likelihood of a sample as a function of the law, for one family.
 ///
 /// A diameter counts with the density f2 g / int f2 g, or with its mean over the resolution; a bin
-/// with its probability; log_prior is added. Not thread-safe: it remembers the sections of the last
-/// shape.
+/// with its probability; log_prior is added. A law of whose sections less than 1e-12 are seen is
+/// kImpossible or less. Not thread-safe: it remembers the sections of the last shape.
 class Likelihood {
 public:
     /// Lower than any likelihood, but a number: methods that draw parabolas need one.
@@ -90,7 +90,7 @@ public:
     double operator()(double log_mean, double shape);
     /// int f2 g: the share of sections that are marked.
     double seen(double log_mean, double shape);
-    /// 1 - F3 of the detection limit: the share of holes that are above it.
+    /// 1 - F3 of the detection limit: the share of holes that are above it; never 0.
     double above(double log_mean, double shape);
 
     Family family() const { return family_; }

@@ -35,6 +35,15 @@ constexpr double kFarthest = 12;
                                     "the detection limit");
 }
 
+// A peak that means something.
+Peak sound(Likelihood& likelihood, const Peak& peak) {
+    if (likelihood.seen(peak.log_mean, peak.shape) >= kLeastSeen)
+        return peak;
+    throw Error(Fault::numeric, "fit: " + std::string(family_name(likelihood.family())) +
+                                    ": hardly any hole of the likeliest law reaches the detection "
+                                    "limit; lower it or mark holes of several sizes");
+}
+
 struct Top {
     double at, height;
     bool far; ///< the walk uphill did not end
@@ -201,7 +210,7 @@ Peak find_peak(Likelihood& likelihood) {
         const Top top = ridge.top(0, 26);
         if (top.far)
             refuse_no_maximum(likelihood.family());
-        return {top.at, 0, top.height, false};
+        return sound(likelihood, {top.at, 0, top.height, false});
     }
     constexpr int kScan = 8; // as many shapes as tell the right hill from its neighbours
     const double stride = (range->hi - range->lo) / kScan;
@@ -227,7 +236,7 @@ Peak find_peak(Likelihood& likelihood) {
     const bool natural = range->lo_is_natural && shape == range->lo;
     if (top.far)
         refuse_no_maximum(likelihood.family());
-    return {top.at, shape, top.height, at_edge && !natural};
+    return sound(likelihood, {top.at, shape, top.height, at_edge && !natural});
 }
 
 Region likelihood_region(Likelihood& likelihood, const Peak& peak, double floor) {
@@ -298,6 +307,14 @@ std::vector<LawPart> law_parts(Likelihood& likelihood, const Peak& peak) {
                   shape_end(ridge, peak, peak.log_likelihood - depth, range->hi, open)};
     std::vector<LawPart> parts;
     double sum = 0;
+    const auto add = [&](double weight, double log_mean, double width, double shape) {
+        const double seen = likelihood.seen(log_mean, shape);
+        if (!(seen >= kLeastSeen))
+            return;
+        parts.push_back({weight, log_mean, width, std::exp(log_mean) * seen,
+                         likelihood.above(log_mean, shape)});
+        sum += weight;
+    };
     for (int j = 0; j <= n_shapes; ++j) {
         const double shape =
             range ? shapes.lo + (shapes.hi - shapes.lo) * j / n_shapes : peak.shape;
@@ -313,13 +330,12 @@ std::vector<LawPart> law_parts(Likelihood& likelihood, const Peak& peak) {
             const double log_mean = lo + width * i;
             const double weight =
                 width * std::exp(likelihood(log_mean, shape) - peak.log_likelihood);
-            if (!(weight > 1e-9 * width))
-                continue;
-            const double exposure = std::exp(log_mean) * likelihood.seen(log_mean, shape);
-            parts.push_back({weight, log_mean, width, exposure, likelihood.above(log_mean, shape)});
-            sum += weight;
+            if (weight > 1e-9 * width)
+                add(weight, log_mean, width, shape);
         }
     }
+    if (parts.empty()) // a peak too narrow for the grid
+        add(1, peak.log_mean, 1e-9, peak.shape);
     for (LawPart& part : parts)
         part.weight /= sum;
     return parts;

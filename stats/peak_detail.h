@@ -11,13 +11,19 @@
 
 namespace taihu {
 
+/// Share of the sections that must be above the limit: profiles that all lie within a hundredth of
+/// it suit laws of which nothing reaches it, whose number of holes has no end.
+inline constexpr double kLeastSeen = 1e-9;
+
 struct Peak {
     double log_mean = 0, shape = 0;
     double log_likelihood = 0;
     bool at_edge = false; ///< the shape is the first or the last one that is tried
 };
 
-/// \throws Error numeric: it rises without end towards smaller or greater means.
+/// \throws Error numeric: it rises without end towards smaller or greater means, or to a law of
+/// whose
+///         sections less than kLeastSeen would be seen.
 Peak find_peak(Likelihood& likelihood);
 
 struct Region {
@@ -40,7 +46,7 @@ struct LawPart {
     double above = 1;               ///< share of its holes above the detection limit
 };
 
-/// About 60 parts of a family of one parameter, 350 of two.
+/// About 60 parts of a family of one parameter, 350 of two; at least one.
 std::vector<LawPart> law_parts(Likelihood& likelihood, const Peak& peak);
 
 /// What N_V may be: Gamma(n + 1/2, area * exposure) laws, mixed by weights that need not sum to 1.

@@ -241,11 +241,11 @@ void signed_roots(const float* squared, const std::int8_t* winding, float* out) 
 }
 
 TAIHU_CLONES
-LeafBits to_band(const float* values, float voxel, float background, float* out) {
+LeafBits to_band(const float* values, float half_width, float voxel, float background, float* out) {
     LeafBits bits{};
     for (int i = 0; i < 64; ++i) {
-        const V8 v = load(values + 8 * i) * voxel;
-        const Lanes band = below(v, background);
+        const V8 in = load(values + 8 * i), v = in * voxel;
+        const Lanes band = below(in, half_width) & below(v, background);
         store(out + 8 * i, hold(v, band, background));
         bits.word[i / 8] |= bits_of(band) << i % 8 * 8;
     }

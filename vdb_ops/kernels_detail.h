@@ -59,8 +59,9 @@ struct LeafBits {
 void subtract_values(const float* a, const float* b, float* out);
 
 /// Distances of a leaf [voxels] to those of a level set [m]: out = values * voxel, held to
-/// +-background. Returns the bits of |out| < background.
-LeafBits to_band(const float* values, float voxel, float background, float* out);
+/// +-background. Returns the bits of |values| < half_width and |out| < background: fields may hold
+/// values to the half width, and the product with a voxel is rounded.
+LeafBits to_band(const float* values, float half_width, float voxel, float background, float* out);
 
 /// The same from values [m] of which only the `active` ones count beyond their sign.
 LeafBits copy_band(const float* values, const LeafBits& active, float background, float* out);

@@ -48,7 +48,8 @@ struct NodeResult {
 class Rasterizer {
 public:
     Rasterizer(const LatticeField& field, const Lattice& lattice)
-        : field_(field), box_(field.bounds()), voxel_(static_cast<float>(lattice.voxel_m)),
+        : field_(field), box_(field.bounds()), half_width_(lattice.half_width_vox),
+          voxel_(static_cast<float>(lattice.voxel_m)),
           background_(static_cast<float>(lattice.half_width_vox * lattice.voxel_m)) {}
 
     float background() const { return background_; }
@@ -121,7 +122,7 @@ private:
         } else {
             alignas(64) float values[512];
             sampler.values(origin, values);
-            active = to_band(values, voxel_, background_, out);
+            active = to_band(values, half_width_, voxel_, background_, out);
         }
         if (std::all_of(active.word, active.word + 8, [](std::uint64_t w) { return w == 0; }))
             return out[0] < 0 ? Cover::inside : Cover::outside;
@@ -136,7 +137,7 @@ private:
     static constexpr std::size_t kLeavesPerBlock = 512;
     const LatticeField& field_;
     CoordBBox box_;
-    float voxel_, background_;
+    float half_width_, voxel_, background_;
 };
 
 void check_lattice(const Lattice& lattice) {

@@ -403,6 +403,24 @@ TEST(FitLaws, AllTogetherAreTheFitWhereOneFamilyIsGiven) {
     EXPECT_NEAR(one.mean_diameter.hi / one.fits[0].mean_diameter.hi, 1, 0.02);
 }
 
+TEST(FitLaws, RefuseLawsOfWhichNothingIsSeen) {
+    Sample sample; // from the limit to 1 % above it: anything that falls steeply there would do
+    for (int i = 0; i < 40; ++i)
+        sample.diameters.push_back(1 + 0.00025 * i);
+    sample.area = 10;
+    const LawRanking ranking = fit_laws(sample);
+    EXPECT_EQ(ranking.fits[0].law.family(), Family::constant);
+    ASSERT_FALSE(ranking.notes.empty());
+    EXPECT_THAT(ranking.notes[0],
+                HasSubstr("exponential left out: fit: exponential: hardly any hole"));
+    // 40 profiles, of spheres that show a seventh of their height above the limit, on an area
+    // of 10.
+    EXPECT_NEAR(ranking.n_v->mean, 28, 10);
+    EXPECT_GT(ranking.n_v->lo, 10);
+    EXPECT_LT(ranking.n_v->hi, 100);
+    EXPECT_LT(ranking.n_v->sd, 10);
+}
+
 TEST(FitLaw, DoesNotFillTheDarkWithSmallHoles) {
     // The likeliest of the allowed shapes without a prior is the lowest, 0.05, and N_V twelvefold,
     // in one of fifty samples.

@@ -89,11 +89,20 @@ TEST(Kernels, SubtractBallsIsTheDistanceToTheUnionInTheBand) {
 TEST(Kernels, ToBandScalesHoldsAndMarks) {
     const std::vector<float> values = some_values(1, kWidth);
     float out[512];
-    const LeafBits bits = plain_to_band(values.data(), 0.5f, 0.5f * kWidth, out);
+    const LeafBits bits = plain_to_band(values.data(), kWidth, 0.5f, 0.5f * kWidth, out);
     for (std::size_t i = 0; i < 512; ++i) {
         ASSERT_EQ(out[i], std::clamp(0.5f * values[i], -0.5f * kWidth, 0.5f * kWidth));
         ASSERT_EQ(bit(bits, i), std::fabs(values[i]) < kWidth);
     }
+}
+
+TEST(Kernels, ValuesHeldToTheHalfWidthAreNotInTheBand) {
+    std::vector<float> values(512, 3.f);
+    std::fill_n(values.begin(), 256, -3.f);
+    float out[512]; // 3 times 0.03f is less than 0.09f
+    EXPECT_EQ(plain_to_band(values.data(), 3, 0.03f, 0.09f, out), LeafBits{});
+    EXPECT_EQ(out[0], -0.09f);
+    EXPECT_EQ(out[511], 0.09f);
 }
 
 TEST(Kernels, StoredValuesCountWhereTheyAreActive) {
@@ -132,8 +141,8 @@ TEST(Kernels, EveryInstructionSetGivesTheSameBits) {
 
         const std::vector<float> values = some_values(trial, kWidth);
         const LeafBits active = some_bits(trial);
-        EXPECT_EQ(plain_to_band(values.data(), 0.01f, 0.03f, a.data()),
-                  to_band(values.data(), 0.01f, 0.03f, b.data()));
+        EXPECT_EQ(plain_to_band(values.data(), kWidth, 0.01f, 0.03f, a.data()),
+                  to_band(values.data(), kWidth, 0.01f, 0.03f, b.data()));
         ASSERT_EQ(a, b);
         EXPECT_EQ(plain_copy_band(values.data(), active, kWidth, a.data()),
                   copy_band(values.data(), active, kWidth, b.data()));
