@@ -3,7 +3,7 @@
 
 #include <openvdb/openvdb.h>
 
-#include "stats/core/vec3.h"
+#include "vdb_ops/field_probe.h"
 
 namespace taihu {
 
