@@ -1,10 +1,12 @@
 #include "mesh_out/position_grid.h"
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
 #include <cstdint>
 #include <cstdio>
 #include <deque>
+#include <limits>
 #include <string>
 #include <unordered_map>
 #include <utility>
@@ -81,6 +83,37 @@ PositionGrid position_grid(const Box& box, double max_move_m, double origin_step
                                     shown(fits) + " m: allow moves of " +
                                     shown(fits * std::sqrt(3.0) / 2) +
                                     " m, or bring the mesh nearer to the origin");
+}
+
+PositionGrid finest_grid(const Box& box) {
+    const double step = std::exp2(std::ceil(std::log2(box.longest() / 0x1p17)));
+    return position_grid(box, step * std::sqrt(3.0) / 2 * (1 + 1e-9));
+}
+
+std::optional<PositionGrid> grid_of(const TriMesh& mesh) {
+    Box box;
+    int lowest = std::numeric_limits<int>::max(); // exponent of the least bit of any coordinate
+    for (const Vec3& p : mesh.positions) {
+        if (!is_finite(p))
+            return std::nullopt;
+        box.include(p);
+        for (int axis = 0; axis < 3; ++axis) {
+            int exponent = 0;
+            const auto digits =
+                static_cast<std::int64_t>(std::ldexp(std::frexp(p[axis], &exponent), 53));
+            if (digits != 0)
+                lowest = std::min(lowest, exponent - 53 +
+                                              std::countr_zero(static_cast<std::uint64_t>(digits)));
+        }
+    }
+    if (lowest == std::numeric_limits<int>::max())
+        return std::nullopt;
+    PositionGrid grid{box.lo, std::ldexp(1.0, lowest), 1};
+    while (grid.bits <= kMaxBits && std::exp2(grid.bits) <= box.longest() / grid.step_m)
+        ++grid.bits;
+    if (grid.bits > kMaxBits)
+        return std::nullopt;
+    return grid;
 }
 
 namespace {

@@ -1,4 +1,6 @@
 #pragma once
+#include <optional>
+
 #include "stats/core/tri_mesh.h"
 
 namespace taihu {
@@ -21,6 +23,12 @@ struct PositionGrid {
 /// exactly
 ///         (too far from the origin); the message names the finest step that fits.
 PositionGrid position_grid(const Box& box, double max_move_m, double origin_step_m = 0);
+
+/// The grid of the finest step that 18 bits hold for `box`. \throws Error as position_grid().
+PositionGrid finest_grid(const Box& box);
+
+/// The coarsest grid that all positions of `mesh` are on, if it needs no more than 18 bits.
+std::optional<PositionGrid> grid_of(const TriMesh& mesh);
 
 struct SnapResult {
     TriMesh mesh;                ///< positions on the grid, all different, no zero-area triangle

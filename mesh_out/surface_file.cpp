@@ -10,16 +10,10 @@
 namespace taihu {
 namespace {
 
-/// Farthest that rounding moves a vertex of the uniform surface: what 18 bits allow, far below a
-/// voxel for all but the largest grids.
-double uniform_move_m(const Box& box) {
-    const double step = std::exp2(std::ceil(std::log2(box.longest() / 0x1p17)));
-    return step * std::sqrt(3.0) / 2 * (1 + 1e-9);
-}
-
-/// The uniform surface on a position grid, so that every format can hold it exactly.
-EncodedLevel uniform_level(const openvdb::FloatGrid& solid, const TriMesh& surface) {
-    const PositionGrid grid = position_grid(bounds(surface), uniform_move_m(bounds(surface)));
+/// The uniform surface on a position grid, so that every format can hold it exactly. Rounding to 18
+/// bits is far below a voxel for all but the largest grids.
+EncodedLevel uniform_level(const openvdb::FloatGrid& solid, const TriMesh& surface,
+                           const PositionGrid& grid) {
     TriMesh snapped = snap_to_grid(surface, grid).mesh;
     snapped.normals = surface_normals(solid, snapped.positions);
     return encode_draco(snapped, grid);
@@ -34,8 +28,9 @@ SurfaceFile format_surface(const openvdb::FloatGrid& solid, MeshFormat format,
     EncodedLevel level;
     if (settings.uniform) {
         const TriMesh surface = extract_uniform(solid, progress);
-        level = uniform_level(solid, surface);
-        file.bound_m = 4 * uniform_move_m(bounds(surface)); // a few steps where vertices met
+        const PositionGrid grid = finest_grid(bounds(surface));
+        level = uniform_level(solid, surface, grid);
+        file.bound_m = 4 * grid.step_m; // a few steps where vertices met
         file.error_m = two_sided_distance(level.decoded, surface, solid.voxelSize().x() / 2).max_m;
     } else {
         LodChain chain =

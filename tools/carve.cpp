@@ -134,7 +134,8 @@ void add_carve(CLI::App& app, Console& console) {
         ->required();
     verb->add_option("--holes", args->holes, "Table x_m,y_m,z_m,radius_m (.csv) or a law (.json)")
         ->required();
-    verb->add_option("-o,--output", args->out, "Where to write it (.vdb .obj .ply .stl .off .glb)")
+    verb->add_option("-o,--output", args->out,
+                     "Where to write it (.vdb .obj .ply .stl .off .glb .drc)")
         ->required();
     args->placement.add_options(*verb);
     verb->add_option("--pieces", args->pieces, "Keep the largest, all, or this many pieces")

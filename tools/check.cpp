@@ -50,7 +50,7 @@ void add_check(CLI::App& app, Console& console) {
         app, "check", "Say whether a file holds closed, manifold, outward surfaces (exit 3 if not)",
         "  taihu check rock.glb\n"
         "  taihu check scan.stl --json | jq .levels[0].boundary_edges");
-    verb->add_option("file", args->path, "File to check (.vdb .obj .ply .stl .off .glb)")
+    verb->add_option("file", args->path, "File to check (.vdb .obj .ply .stl .off .glb .drc)")
         ->required();
     args->add_mesh_options(*verb);
     verb->callback([args, &console] { console.with_threads([&] { run(*args, console); }); });

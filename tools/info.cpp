@@ -100,7 +100,7 @@ void run(const SolidOptions& options, const Console& console) {
     else
         throw Error(Fault::unsupported,
                     options.path.string() + ": unknown extension '" + extension +
-                        "'; use .vdb, .obj, .ply, .stl, .off, .glb, .json or .csv");
+                        "'; use .vdb, .obj, .ply, .stl, .off, .glb, .drc, .json or .csv");
     if (json.contains("recipe")) { // text in the file, an object for people and programs
         const std::string text = json["recipe"].get<std::string>();
         json["recipe"] = recipe_solid(text) ? Json::parse(text) : Json(nullptr);
@@ -130,7 +130,7 @@ void add_info(CLI::App& app, Console& console) {
                               "  taihu info rock.vdb --json | jq .recipe");
     verb->add_option(
             "file", args->path,
-            "A solid or mesh (.vdb .obj .ply .stl .off .glb), a law or report (.json), or a "
+            "A solid or mesh (.vdb .obj .ply .stl .off .glb .drc), a law or report (.json), or a "
             "table (.csv)")
         ->required();
     args->add_mesh_options(*verb);

@@ -220,7 +220,8 @@ void add_measure(CLI::App& app, Console& console) {
                               "  taihu measure rock.vdb --base base.vdb --pores --law law.json\n"
                               "  taihu measure rock.vdb --tradition\n"
                               "  taihu measure rock.glb --json | jq .porosity_hull");
-    verb->add_option("file", args->file.path, "What to measure (.vdb .obj .ply .stl .off .glb)")
+    verb->add_option("file", args->file.path,
+                     "What to measure (.vdb .obj .ply .stl .off .glb .drc)")
         ->required();
     verb->add_option("--base", args->base, "Solid before carving, for porosity (.vdb or a mesh)");
     auto* law = verb->add_option(

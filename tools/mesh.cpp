@@ -15,7 +15,8 @@ struct MeshArgs {
 void run(const MeshArgs& args, const Console& console) {
     if (!mesh_format(args.out))
         throw Error(Fault::unsupported,
-                    args.out.string() + ": not a mesh format; use .obj, .ply, .stl, .off or .glb");
+                    args.out.string() +
+                        ": not a mesh format; use .obj, .ply, .stl, .off, .glb or .drc");
     args.surface.check(args.out);
     console.may_write(args.out, {args.solid.path});
     const Solid solid = read_solid(args.solid, console);
@@ -34,7 +35,7 @@ void add_mesh(CLI::App& app, Console& console) {
         "  taihu mesh rock.vdb --uniform -o rock.stl");
     verb->add_option("solid", args->solid.path, "Level set to mesh (.vdb, or a mesh to remesh)")
         ->required();
-    verb->add_option("-o,--output", args->out, "Where to write it (.obj .ply .stl .off .glb)")
+    verb->add_option("-o,--output", args->out, "Where to write it (.obj .ply .stl .off .glb .drc)")
         ->required();
     args->surface.add_options(*verb);
     args->solid.add_voxel_options(*verb);

@@ -68,7 +68,7 @@ void add_render(CLI::App& app, Console& console) {
                               "  taihu render rock.vdb --turntable 90 --size 800x1000 -o side.exr\n"
                               "  taihu render rock.glb --levels -o sheet.png");
     RenderSettings& s = args->settings;
-    verb->add_option("file", args->file.path, "What to show (.vdb .obj .ply .stl .off .glb)")
+    verb->add_option("file", args->file.path, "What to show (.vdb .obj .ply .stl .off .glb .drc)")
         ->required();
     verb->add_option("-o,--output", args->out, "Picture to write (.png, or .exr in linear light)")
         ->required();

@@ -187,7 +187,8 @@ void add_rock(CLI::App& app, Console& console) {
     verb->add_option("--preset", args->preset, "or one that comes with taihu: see --list");
     verb->add_option("--from", args->from, "or that of a solid or mesh that taihu wrote");
     verb->add_flag("--list", args->list, "Print the presets and what --set changes in them");
-    verb->add_option("-o,--output", args->out, "Where to write it (.vdb .obj .ply .stl .off .glb)");
+    verb->add_option("-o,--output", args->out,
+                     "Where to write it (.vdb .obj .ply .stl .off .glb .drc)");
     verb->add_option("--report", args->report, "Where to write the figures of the levels (.json)");
     verb->add_option("--holes", args->holes, "Where to write the holes that were carved (.csv)");
     verb->add_option("--height", args->height, "Scale all of it to this height: 1.8m");

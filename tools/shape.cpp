@@ -100,7 +100,8 @@ void add_shape(CLI::App& app, Console& console) {
                      "sphere, ellipsoid, box, rounded_box, cylinder, capsule, torus, superquadric, "
                      "icosphere or boulder")
         ->required();
-    verb->add_option("-o,--output", args->out, "Where to write it (.vdb .obj .ply .stl .off .glb)")
+    verb->add_option("-o,--output", args->out,
+                     "Where to write it (.vdb .obj .ply .stl .off .glb .drc)")
         ->required();
     verb->add_option("--size", args->size, "Extent: one length, or X,Y,Z; the centre is the origin")
         ->capture_default_str();

@@ -35,7 +35,7 @@ void check_solid_path(const std::filesystem::path& path) {
     if (!is_vdb(path) && !mesh_format(path))
         throw Error(Fault::unsupported, path.string() + ": unknown extension '" +
                                             path.extension().string() +
-                                            "'; use .vdb, .obj, .ply, .stl, .off or .glb");
+                                            "'; use .vdb, .obj, .ply, .stl, .off, .glb or .drc");
 }
 
 void SolidOptions::add_mesh_options(CLI::App& verb) {

@@ -23,6 +23,7 @@ namespace taihu {
 namespace {
 
 constexpr int kNormalBits = 10, kSpeed = 3;
+constexpr const char* kRecipeKey = "taihu_recipe";
 /// A stream may claim this many faces whatever its length, and 64 more for each of its bytes: far
 /// more than any real mesh has, and little enough to allocate.
 constexpr std::uint64_t kFreeFaces = std::uint64_t{1} << 22, kFacesPerByte = 64;
@@ -99,13 +100,33 @@ int add_vectors(draco::Mesh& mesh, draco::GeometryAttribute::Type type,
     return id;
 }
 
-std::unique_ptr<draco::Mesh> to_draco(const TriMesh& mesh) {
+/// Grey, because that is what viewers multiply a material with.
+void add_colours(draco::Mesh& mesh, const std::vector<float>& openness) {
+    draco::GeometryAttribute attribute;
+    attribute.Init(draco::GeometryAttribute::COLOR, nullptr, 3, draco::DT_UINT8, true, 3, 0);
+    const int id = mesh.AddAttribute(attribute, true, static_cast<std::uint32_t>(openness.size()));
+    for (std::size_t i = 0; i < openness.size(); ++i) {
+        const auto grey = static_cast<std::uint8_t>(std::lround(255 * openness[i]));
+        const std::uint8_t colour[3] = {grey, grey, grey};
+        mesh.attribute(id)->SetAttributeValue(
+            draco::AttributeValueIndex(static_cast<std::uint32_t>(i)), colour);
+    }
+}
+
+std::unique_ptr<draco::Mesh> to_draco(const TriMesh& mesh, const std::string& recipe) {
     auto made = std::make_unique<draco::Mesh>(); // it can be neither copied nor moved
     draco::Mesh& out = *made;
     out.set_num_points(static_cast<std::uint32_t>(mesh.positions.size()));
     add_vectors(out, draco::GeometryAttribute::POSITION, mesh.positions);
     if (!mesh.normals.empty())
         add_vectors(out, draco::GeometryAttribute::NORMAL, mesh.normals);
+    if (!mesh.openness.empty())
+        add_colours(out, mesh.openness);
+    if (!recipe.empty()) {
+        auto metadata = std::make_unique<draco::GeometryMetadata>();
+        metadata->AddEntryString(kRecipeKey, recipe);
+        out.AddMetadata(std::move(metadata));
+    }
     out.SetNumFaces(mesh.triangles.size());
     for (std::size_t i = 0; i < mesh.triangles.size(); ++i) {
         const Triangle& t = mesh.triangles[i];
@@ -178,6 +199,21 @@ std::vector<Vec3> vectors_of(const draco::Mesh& mesh, const draco::PointAttribut
     return out;
 }
 
+/// Red, when it is that of taihu's own streams: three bytes a point.
+std::vector<float> openness_of(const draco::Mesh& mesh, const draco::PointAttribute& attribute,
+                               const std::string& where) {
+    std::vector<float> out(mesh.num_points());
+    for (std::uint32_t i = 0; i < mesh.num_points(); ++i) {
+        std::uint8_t colour[3] = {};
+        const auto index = attribute.mapped_index(draco::PointIndex(i));
+        if (index.value() >= attribute.size() ||
+            !attribute.ConvertValue<std::uint8_t, 3>(index, colour))
+            fail(where, "the Draco stream has broken colours");
+        out[i] = static_cast<float>(colour[0]) / 255;
+    }
+    return out;
+}
+
 std::unique_ptr<draco::Mesh> decode(std::string_view bytes, const std::string& where) {
     draco::DecoderBuffer buffer;
     buffer.Init(bytes.data(), bytes.size());
@@ -212,6 +248,13 @@ DracoMesh decode_draco_mesh(std::string_view bytes, const std::string& where) {
         out.mesh.normals = vectors_of(*decoded, *normals, where);
         out.normal_id = normals->unique_id();
     }
+    const auto* colours = decoded->GetNamedAttribute(draco::GeometryAttribute::COLOR);
+    if (colours && colours->num_components() == 3 && colours->data_type() == draco::DT_UINT8) {
+        out.mesh.openness = openness_of(*decoded, *colours, where);
+        out.colour_id = colours->unique_id();
+    }
+    if (const auto* metadata = decoded->GetMetadata())
+        metadata->GetEntryString(kRecipeKey, &out.recipe);
     for (int i = 0; i < decoded->num_attributes(); ++i)
         out.ids.push_back(decoded->attribute(i)->unique_id());
     out.mesh.triangles.resize(decoded->num_faces());
@@ -231,10 +274,11 @@ TriMesh decode_draco(std::string_view bytes, const std::string& where) {
     return decode_draco_mesh(bytes, where).mesh;
 }
 
-EncodedLevel encode_draco(const TriMesh& mesh, const PositionGrid& grid) {
+EncodedLevel encode_draco(const TriMesh& mesh, const PositionGrid& grid,
+                          const std::string& recipe) {
     check_writable(mesh, "encode_draco");
     const int exponent = check_on_grid(mesh, grid);
-    const auto source = to_draco(mesh);
+    const auto source = to_draco(mesh, recipe);
     draco::ExpertEncoder encoder(*source);
     encoder.SetEncodingMethod(draco::MESH_EDGEBREAKER_ENCODING);
     encoder.SetSpeedOptions(kSpeed, kSpeed);
@@ -261,8 +305,12 @@ EncodedLevel encode_draco(const TriMesh& mesh, const PositionGrid& grid) {
         give_up(std::to_string(mesh.positions.size()) + " points and " +
                 std::to_string(mesh.triangles.size()) + " faces came back as " +
                 std::to_string(n_points) + " and " + std::to_string(n_faces));
+    const auto id = [](bool there, std::uint32_t number) {
+        return there ? std::optional(number) : std::nullopt;
+    };
     if (decoded.position_id != kDracoPositionId ||
-        decoded.normal_id != (mesh.normals.empty() ? std::nullopt : std::optional(kDracoNormalId)))
+        decoded.normal_id != id(!mesh.normals.empty(), kDracoNormalId) ||
+        decoded.colour_id != id(!mesh.openness.empty(), draco_colour_id(mesh)))
         give_up("Draco numbered the attributes in another way");
     if (sorted_faces(level.decoded) != sorted_faces(mesh))
         give_up("a face came back with other positions");

@@ -11,12 +11,17 @@ namespace taihu {
 
 /// Draco's unique ids of the attributes that encode_draco() writes.
 inline constexpr std::uint32_t kDracoPositionId = 0, kDracoNormalId = 1;
+/// They are numbered without a gap.
+inline std::uint32_t draco_colour_id(const TriMesh& mesh) {
+    return mesh.normals.empty() ? 1 : 2;
+}
 
 /// A decoded mesh with the attribute ids that glTF refers to.
 struct DracoMesh {
     TriMesh mesh;
     std::uint32_t position_id = 0;
-    std::optional<std::uint32_t> normal_id;
+    std::optional<std::uint32_t> normal_id, colour_id;
+    std::string recipe;             ///< of the stream's metadata, or empty
     std::vector<std::uint32_t> ids; ///< of all attributes
 };
 

@@ -12,16 +12,19 @@ namespace taihu {
 /// A level of detail as it stands in a file.
 struct EncodedLevel {
     std::string draco; ///< one Draco mesh bit stream
-    TriMesh decoded;   ///< what decoding those bytes gives: positions, normals, triangles
+    TriMesh decoded;   ///< what decoding those bytes gives
     double screen_coverage =
         0; ///< MSFT_screencoverage: share of the screen down to which it is used
 };
 
 /// Compress with Draco's ExpertEncoder: edgebreaker, positions on `grid` without loss, normals
-/// (when the mesh has them) in 10 bits, speed 3; then decode the bytes again. \throws Error numeric
-/// when the decoded mesh has other counts, or a position that is not one of
-///   the mesh's; bad_argument when a position is not on the grid.
-EncodedLevel encode_draco(const TriMesh& mesh, const PositionGrid& grid);
+/// (when the mesh has them) in 10 bits, openness (likewise) as grey of 8 bits, speed 3; then decode
+/// the bytes again. \param recipe  kept in the stream's metadata; empty for a GLB, which has a
+/// place for it. \throws Error numeric when the decoded mesh has other counts, or a position that
+/// is not
+///   one of the mesh's; bad_argument when a position is not on the grid.
+EncodedLevel encode_draco(const TriMesh& mesh, const PositionGrid& grid,
+                          const std::string& recipe = {});
 
 /// \param where  stands for the file's name in messages.
 /// \throws Error bad_input: not a Draco mesh, cut short, no positions, an index past the last
@@ -36,9 +39,10 @@ struct GlbSettings {
     double grey = 0.56;        ///< base colour, linear, 0..1
 };
 
-/// A GLB of Draco levels, finest first: KHR_draco_mesh_compression (required), and with more than
-/// one level MSFT_lod on the first node and MSFT_screencoverage in its extras. Accessor counts,
-/// minima and maxima are those of the decoded arrays. The same input gives the same bytes.
+/// A GLB of Draco levels, finest first: KHR_draco_mesh_compression (required), openness as COLOR_0,
+/// which viewers multiply the base colour with, and with more than one level MSFT_lod on the first
+/// node and MSFT_screencoverage in its extras. Accessor counts, minima and maxima are those of the
+/// decoded arrays. The same input gives the same bytes.
 std::string format_glb(std::span<const EncodedLevel> levels, const GlbSettings& settings = {});
 
 } // namespace taihu

@@ -1,3 +1,4 @@
+#include <cmath>
 #include <limits>
 
 #include <nlohmann/json.hpp>
@@ -38,11 +39,14 @@ struct Assembly {
         return recipe;
     }
 
-    /// Index of a new view of `bytes`; no `target` for data that only an extension reads.
-    std::size_t add_view(std::string_view bytes, int target = 0) {
+    /// Index of a new view of `bytes`; no `target` for data that only an extension reads, no
+    /// `stride` for elements without gaps.
+    std::size_t add_view(std::string_view bytes, int target = 0, int stride = 0) {
         Json view = {{"buffer", 0}, {"byteOffset", bin.size()}, {"byteLength", bytes.size()}};
         if (target != 0)
             view["target"] = target;
+        if (stride != 0)
+            view["byteStride"] = stride;
         bin += bytes;
         bin.resize((bin.size() + 3) / 4 * 4); // glTF aligns views to their numbers
         json["bufferViews"].push_back(view);
@@ -57,6 +61,12 @@ struct Assembly {
     /// What a viewer needs to know of an array, wherever its data are.
     static Json describe_vectors(const std::vector<Vec3>& vectors) {
         return {{"componentType", kGltfFloat}, {"count", vectors.size()}, {"type", "VEC3"}};
+    }
+    static Json describe_colours(const std::vector<float>& openness) {
+        return {{"componentType", kGltfUbyte},
+                {"count", openness.size()},
+                {"type", "VEC3"},
+                {"normalized", true}};
     }
     static Json describe_positions(const std::vector<Vec3>& positions) {
         Json out = describe_vectors(positions);
@@ -118,6 +128,11 @@ Json draco_primitive(Assembly& glb, const EncodedLevel& level) {
         primitive["attributes"]["NORMAL"] =
             glb.add_accessor(Assembly::describe_vectors(mesh.normals));
     }
+    if (!mesh.openness.empty()) {
+        attributes["COLOR_0"] = draco_colour_id(mesh);
+        primitive["attributes"]["COLOR_0"] =
+            glb.add_accessor(Assembly::describe_colours(mesh.openness));
+    }
     primitive["extensions"]["KHR_draco_mesh_compression"] = {{"bufferView", view},
                                                              {"attributes", attributes}};
     return primitive;
@@ -149,6 +164,14 @@ std::string format_plain_glb(const TriMesh& mesh, const std::string& recipe) {
         Json normal = Assembly::describe_vectors(mesh.normals);
         normal["bufferView"] = glb.add_view(float_bytes(mesh.normals), kArrayBuffer);
         attributes["NORMAL"] = glb.add_accessor(normal);
+    }
+    if (!mesh.openness.empty()) {
+        std::string greys; // of four bytes each: a view of vertices is aligned to four
+        for (const float o : mesh.openness)
+            greys.append(3, static_cast<char>(std::lround(255 * o))) += '\0';
+        Json colour = Assembly::describe_colours(mesh.openness);
+        colour["bufferView"] = glb.add_view(greys, kArrayBuffer, 4);
+        attributes["COLOR_0"] = glb.add_accessor(colour);
     }
     std::string corners;
     corners.reserve(12 * mesh.triangles.size());

@@ -13,8 +13,9 @@
 namespace taihu {
 namespace {
 
-constexpr std::array<std::string_view, 5> kExtensions = {".obj", ".ply", ".stl", ".off", ".glb"};
-constexpr std::array<const char*, 5> kNames = {"OBJ", "PLY", "STL", "OFF", "GLB"};
+constexpr std::array<std::string_view, 6> kExtensions = {".obj", ".ply", ".stl",
+                                                         ".off", ".glb", ".drc"};
+constexpr std::array<const char*, 6> kNames = {"OBJ", "PLY", "STL", "OFF", "GLB", "DRC"};
 constexpr std::string_view kRecipeMarker = "taihu_recipe ";
 
 const char* name_of(MeshFormat format) {
@@ -25,6 +26,8 @@ const char* name_of(MeshFormat format) {
 std::optional<MeshFormat> format_by_content(std::string_view bytes) {
     if (bytes.starts_with("glTF"))
         return MeshFormat::glb;
+    if (bytes.starts_with("DRACO"))
+        return MeshFormat::drc;
     if (bytes.starts_with("ply\n") || bytes.starts_with("ply\r\n"))
         return MeshFormat::ply;
     if (bytes.starts_with("OFF\n") || bytes.starts_with("OFF\r\n"))
@@ -45,6 +48,8 @@ MeshFile parse_as(std::string_view bytes, MeshFormat format, const std::string& 
         return parse_stl(bytes, where, progress);
     case MeshFormat::off:
         return parse_off(bytes, where, progress);
+    case MeshFormat::drc:
+        return parse_drc(bytes, where);
     case MeshFormat::glb:
         break;
     }
@@ -68,9 +73,9 @@ MeshFile read_mesh(const std::filesystem::path& path, const MeshReadSettings& se
                    Progress* progress) {
     const auto format = mesh_format(path);
     if (!format)
-        throw Error(Fault::unsupported,
-                    base_name(path) + ": not a mesh format that is read here; give .obj, .ply, "
-                                      ".stl, .off or .glb");
+        throw Error(Fault::unsupported, base_name(path) +
+                                            ": not a mesh format that is read here; give one of " +
+                                            kMeshExtensions);
     return parse_mesh(read_file(path), *format, base_name(path), settings, progress);
 }
 
@@ -124,6 +129,8 @@ std::string format_mesh(const TriMesh& mesh, MeshFormat format, const std::strin
         return format_stl(mesh);
     case MeshFormat::off:
         return format_off(mesh, recipe);
+    case MeshFormat::drc:
+        return format_drc(mesh, recipe);
     case MeshFormat::glb:
         break;
     }
@@ -155,6 +162,13 @@ void check_writable(const TriMesh& mesh, const std::string& who) {
     for (std::size_t i = 0; i < mesh.normals.size(); ++i)
         if (!(std::abs(length(mesh.normals[i]) - 1) < 1e-3))
             fail("normals[" + std::to_string(i) + "] is not a unit vector", "normalise it");
+    if (!mesh.openness.empty() && mesh.openness.size() != mesh.positions.size())
+        fail(std::to_string(mesh.openness.size()) + " values of openness for " +
+                 std::to_string(mesh.positions.size()) + " positions",
+             "give one for each or none");
+    for (std::size_t i = 0; i < mesh.openness.size(); ++i)
+        if (!(mesh.openness[i] >= 0 && mesh.openness[i] <= 1))
+            fail("openness[" + std::to_string(i) + "] is not in 0..1", "mend it");
 }
 
 std::string recipe_comments(const std::string& recipe, std::string_view prefix) {

@@ -11,7 +11,10 @@
 
 namespace taihu {
 
-enum class MeshFormat { obj, ply, stl, off, glb };
+enum class MeshFormat { obj, ply, stl, off, glb, drc };
+
+/// The extensions of all of them, for messages and help texts.
+inline constexpr const char* kMeshExtensions = ".obj .ply .stl .off .glb .drc";
 
 /// The format that the extension of `path` names, or nothing.
 std::optional<MeshFormat> mesh_format(const std::filesystem::path& path);
@@ -30,7 +33,7 @@ struct MeshFile {
     MeshFormat format = MeshFormat::obj;
     std::vector<TriMesh> levels; ///< a GLB with MSFT_lod has one per level, finest first; else one
     std::vector<double> coverages; ///< MSFT_screencoverage, or empty
-    bool draco = false;            ///< at least one primitive was Draco-compressed
+    bool draco = false;            ///< at least one primitive was Draco-compressed, or a DRC
     std::size_t n_polygons = 0;    ///< faces in the file that had more than three corners
     /// Faces left out because fewer than three different corners remained: they have no inside, and
     /// a surface is the same without them. (A zero-area face of three different corners stays.)
@@ -44,7 +47,7 @@ struct MeshFile {
 /// as fans, quads along the shorter diagonal, others by ear clipping in their best plane); corners
 /// that repeat their neighbour are dropped first. Equal positions of an STL become one vertex.
 /// Colours, texture coordinates and materials are skipped, and normals too (they follow from the
-/// faces), but for those of a GLB when every primitive has them.
+/// faces), but for those of a DRC, or of a GLB when every primitive has them.
 ///
 /// GLB: all triangle primitives of the default scene with their node transforms; points
 /// and lines, skins and morph targets are ignored; at most 2^24 vertices and triangles, or one per
@@ -62,9 +65,11 @@ MeshFile parse_mesh(std::string_view bytes, MeshFormat format, const std::string
                     const MeshReadSettings& settings = {}, Progress* progress = nullptr);
 
 /// The bytes of a file: OBJ and OFF as text with 9 significant digits, PLY and STL binary
-/// little-endian float, GLB uncompressed (float positions, normals if there are any). `recipe` is
-/// kept where the format has a place for it (OBJ, OFF: '#' comment; PLY: comment; GLB:
-/// asset.extras), and given back by parse_mesh (from a GLB as compact JSON); an STL has none.
+/// little-endian float, GLB uncompressed (float positions; normals and openness if there are any),
+/// DRC on the coarsest position grid that holds all positions, else moved onto one of 18 bits.
+/// `recipe` is kept where the format has a place for it (OBJ, OFF: '#' comment; PLY: comment; GLB:
+/// asset.extras; DRC: metadata), and given back by parse_mesh (from a GLB as compact JSON); an STL
+/// has none.
 ///
 /// \throws Error bad_argument: an empty mesh, an index out of range, a position that float cannot
 ///   hold, normals that are not one unit vector per position.

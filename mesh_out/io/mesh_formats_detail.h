@@ -14,16 +14,18 @@ MeshFile parse_off(std::string_view bytes, const std::string& where, Progress* p
 MeshFile parse_ply(std::string_view bytes, const std::string& where, Progress* progress);
 MeshFile parse_stl(std::string_view bytes, const std::string& where, Progress* progress);
 MeshFile parse_glb(std::string_view bytes, const std::string& where, Progress* progress);
+MeshFile parse_drc(std::string_view bytes, const std::string& where);
 
 std::string format_obj(const TriMesh& mesh, const std::string& recipe);
 std::string format_off(const TriMesh& mesh, const std::string& recipe);
 std::string format_ply(const TriMesh& mesh, const std::string& recipe);
 std::string format_stl(const TriMesh& mesh);
 std::string format_plain_glb(const TriMesh& mesh, const std::string& recipe);
+std::string format_drc(const TriMesh& mesh, const std::string& recipe);
 
 /// \throws Error bad_argument, when `mesh` cannot be written: empty, an index out of range,
 /// positions
-///   that float cannot hold, a number of normals that does not match. `who` begins the message.
+///   that float cannot hold, normals or openness that do not match. `who` begins the message.
 void check_writable(const TriMesh& mesh, const std::string& who);
 
 /// Each line of `recipe` behind `prefix` and a marker, for files whose comments are lines.

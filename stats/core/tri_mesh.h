@@ -16,6 +16,8 @@ struct TriMesh {
     std::vector<Vec3> positions; ///< [m]
     std::vector<Triangle> triangles;
     std::vector<Vec3> normals; ///< unit, one per position, or empty
+    /// How much of the sky each position sees, 0..1 (ambient occlusion), or empty.
+    std::vector<float> openness = {};
 };
 
 /// The box of the positions that triangles use; empty for a mesh without triangles.

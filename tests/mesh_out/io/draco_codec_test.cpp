@@ -83,6 +83,22 @@ TEST(EncodeDraco, KeepsNormalsWithinTenBits) {
     }
 }
 
+TEST(EncodeDraco, KeepsOpennessAsGreyOfEightBits) {
+    for (const bool with_normals : {true, false}) {
+        TriMesh mesh = kBall;
+        if (!with_normals)
+            mesh.normals.clear();
+        for (const Vec3& p : mesh.positions)
+            mesh.openness.push_back(static_cast<float>(0.5 + 0.5 * p.y / length(p)));
+        const TriMesh decoded = encode_draco(mesh, kGrid).decoded;
+        ASSERT_EQ(decoded.openness.size(), decoded.positions.size());
+        for (std::size_t i = 0; i < decoded.positions.size(); ++i) {
+            const Vec3& p = decoded.positions[i];
+            EXPECT_NEAR(double(decoded.openness[i]), 0.5 + 0.5 * p.y / length(p), 0.5001 / 255);
+        }
+    }
+}
+
 TEST(EncodeDraco, GivesTheSameBytesAgain) {
     EXPECT_EQ(encode_draco(kBall, kGrid).draco, encode_draco(kBall, kGrid).draco);
     EXPECT_EQ(decode_draco(encode_draco(kBall, kGrid).draco, "rock").positions,
