@@ -22,3 +22,8 @@ export function load(name) {
     process.exit(2);
   }
 }
+
+/** Where the packages are, for a server that hands them to a browser. */
+export function modulesFolder() {
+  return path.join(base, 'node_modules');
+}
