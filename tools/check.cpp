@@ -1,12 +1,27 @@
 // taihu check: the certificate of a file, from the file itself.
 #include "mesh_out/certificate.h"
 #include "mesh_out/extract.h"
+#include "mesh_out/surface_distance.h"
 #include "stats/core/error.h"
 #include "tools/solid_files.h"
+#include "vdb_ops/rasterize.h"
 #include "vdb_ops/vdb_file.h"
 
 namespace taihu {
 namespace {
+
+struct CheckArgs {
+    SolidOptions file;
+    std::filesystem::path against;
+    std::string within;
+};
+
+/// What distances are measured to.
+struct Reference {
+    TriMesh mesh;
+    double spacing_m = 0;                ///< of the samples
+    std::optional<double> within_m = {}; ///< farther is a no
+};
 
 MeshFile content(const SolidOptions& options, const Console& console) {
     if (!is_vdb(options.path))
@@ -16,9 +31,56 @@ MeshFile content(const SolidOptions& options, const Console& console) {
     return file;
 }
 
-void run(const SolidOptions& options, const Console& console) {
-    const std::string where = options.path.string();
-    const MeshFile file = content(options, console);
+/// The finest level of a mesh, or the uniform surface of a level set.
+std::optional<Reference> reference(const CheckArgs& args, const Console& console) {
+    constexpr double kSamples = 1000; // along the longest side of a mesh, which has no voxels
+    if (args.against.empty()) {
+        if (!args.within.empty())
+            throw Error(Fault::bad_argument, "--within: of what? name a file with --against");
+        return std::nullopt;
+    }
+    check_solid_path(args.against);
+    Reference to;
+    Measure measure;
+    if (is_vdb(args.against)) {
+        const auto grid = read_vdb(args.against).solid;
+        to.mesh = extract_uniform(*grid, console.progress);
+        measure = {lattice_of(*grid).voxel_m, bounds(to.mesh).longest()};
+        to.spacing_m = measure.voxel_m / 2;
+    } else {
+        MeshFile file = read_mesh(args.against, args.file.mesh_settings(), console.progress);
+        to.mesh = std::move(file.levels.front());
+        measure.longest_m = bounds(to.mesh).longest();
+        to.spacing_m = measure.longest_m / kSamples;
+    }
+    if (!args.within.empty())
+        to.within_m = length_m("--within", args.within, measure);
+    return to;
+}
+
+/// Farther than --within is a no.
+bool tell_distance(const TriMesh& level, const Reference& to, const std::string& where,
+                   const std::filesystem::path& against, const Console& console,
+                   nlohmann::ordered_json& json) {
+    report_stage(console.progress, "measuring");
+    const TwoSidedDistance d = two_sided_distance(level, to.mesh, to.spacing_m);
+    const bool near = !to.within_m || d.max_m <= *to.within_m;
+    json["distance"] = {{"against", against.string()},
+                        {"max_m", d.max_m},
+                        {"max_to_reference_m", d.max_a_to_b_m},
+                        {"max_from_reference_m", d.max_b_to_a_m},
+                        {"rms_m", d.rms_m},
+                        {"samples", d.n_samples}};
+    console.say("{}: {}{:.3g} m from {} at most ({:.3g} m there, {:.3g} m back), rms {:.3g} m",
+                where, near ? "" : "NO: ", d.max_m, against.string(), d.max_a_to_b_m,
+                d.max_b_to_a_m, d.rms_m);
+    return near;
+}
+
+void run(const CheckArgs& args, const Console& console) {
+    const std::string where = args.file.path.string();
+    const std::optional<Reference> to = reference(args, console);
+    const MeshFile file = content(args.file, console);
     const std::vector<TriMesh>& levels = file.levels;
     bool holds = file.n_degenerate_faces == 0;
     if (!holds)
@@ -33,8 +95,13 @@ void run(const SolidOptions& options, const Console& console) {
         const Certificate c = certify(levels[j]);
         holds = holds && c.holds();
         json["levels"].push_back(certificate_json(c));
-        console.say("{}: {}{}{}", where, levels.size() > 1 ? fmt::format("level {}: ", j) : "",
-                    c.holds() ? "" : "NO: ", certificate_line(c));
+        const std::string level =
+            where + (levels.size() > 1 ? fmt::format(": level {}", j) : std::string());
+        console.say("{}: {}{}", level, c.holds() ? "" : "NO: ", certificate_line(c));
+        if (to)
+            holds = tell_distance(levels[j], *to, level, args.against, console,
+                                  json["levels"].back()) &&
+                    holds;
     }
     json["holds"] = holds;
     console.result(json);
@@ -45,14 +112,18 @@ void run(const SolidOptions& options, const Console& console) {
 } // namespace
 
 void add_check(CLI::App& app, Console& console) {
-    auto args = std::make_shared<SolidOptions>();
+    auto args = std::make_shared<CheckArgs>();
     auto* verb = console.verb(
         app, "check", "Say whether a file holds closed, manifold, outward surfaces (exit 3 if not)",
         "  taihu check rock.glb\n"
+        "  taihu check rock.glb --against rock.vdb --within 1vox\n"
         "  taihu check scan.stl --json | jq .levels[0].boundary_edges");
-    verb->add_option("file", args->path, "File to check (.vdb .obj .ply .stl .off .glb .drc)")
+    verb->add_option("file", args->file.path, "File to check (.vdb .obj .ply .stl .off .glb .drc)")
         ->required();
-    args->add_mesh_options(*verb);
+    verb->add_option("--against", args->against,
+                     "Measure the distance to this solid or mesh, both ways");
+    verb->add_option("--within", args->within, "and say no when it is more: 0.5vox, 2mm, 1%");
+    args->file.add_mesh_options(*verb);
     verb->callback([args, &console] { console.with_threads([&] { run(*args, console); }); });
 }
 

@@ -52,6 +52,17 @@ TEST(Verbs, FromMeasurementsToACertifiedRock) {
     EXPECT_TRUE(check["holds"].get<bool>());
     ASSERT_EQ(check["levels"].size(), 3u);
     EXPECT_EQ(check["levels"][0]["components"], 1);
+    // lod's own figure for the finest level, and every level farther off than the one before.
+    const json far = result("taihu check rock.glb --against rock.vdb", scratch);
+    EXPECT_NEAR(far["levels"][0]["distance"]["max_m"].get<double>(),
+                chain["levels"][0]["error_m"].get<double>(), 1e-9);
+    EXPECT_GT(far["levels"][2]["distance"]["rms_m"], far["levels"][0]["distance"]["rms_m"]);
+    const Finished no =
+        run("taihu check rock.glb --against rock.vdb --within 0.6vox", scratch.path());
+    EXPECT_EQ(no.exit_code, 3);
+    EXPECT_THAT(no.err, HasSubstr("level 2: NO: "));
+    EXPECT_THAT(run("taihu check rock.glb --within 1mm", scratch.path()).err,
+                HasSubstr("name a file with --against"));
     const json measures = result("taihu measure rock.vdb --base base.vdb", scratch);
     EXPECT_GT(measures["porosity_hull"].get<double>(), 0.1);
     EXPECT_NEAR(measures["porosity_base"].get<double>(), rock["porosity_cleaned"].get<double>(),
