@@ -7,6 +7,7 @@
 #include "vdb_ops/analytic_field.h"
 #include "vdb_ops/hole_region_detail.h"
 #include "vdb_ops/rasterize.h"
+#include "vdb_ops/volume.h"
 
 namespace taihu {
 namespace {
@@ -16,6 +17,7 @@ public:
     explicit BoxRegion(const Box& box) : box_(box) {}
     Box box() const override { return box_; }
     Box tight() const override { return box_; }
+    double volume_m3() const override { return box_.volume(); }
     bool inside(const Vec3& p) const override { return box_.contains(p); }
     bool meets(const Sphere& ball) const override {
         return box_distance(ball.center - box_.center(), box_.size() * 0.5) < ball.radius_m;
@@ -28,7 +30,7 @@ private:
 class SolidRegion final : public HoleRegion {
 public:
     explicit SolidRegion(const openvdb::FloatGrid& grid)
-        : lattice_(lattice_of(grid)), accessor_(grid.getConstAccessor()) {
+        : grid_(grid), lattice_(lattice_of(grid)), accessor_(grid.getConstAccessor()) {
         openvdb::CoordBBox box;
         if (!grid.tree().evalLeafBoundingBox(box))
             throw Error(Fault::bad_argument, "holes: the solid is empty; give one that is not");
@@ -52,6 +54,7 @@ public:
                         "holes: the solid is thinner than its voxel; use a smaller voxel");
         return box;
     }
+    double volume_m3() const override { return taihu::volume_m3(grid_); }
     bool inside(const Vec3& p) const override {
         const Vec3 i = (p - lattice_.origin) / lattice_.voxel_m;
         return openvdb::tools::BoxSampler::sample(accessor_, openvdb::Vec3d(i.x, i.y, i.z)) < 0;
@@ -110,6 +113,7 @@ private:
         return false;
     }
 
+    const openvdb::FloatGrid& grid_;
     Lattice lattice_;
     mutable openvdb::FloatGrid::ConstAccessor accessor_; // a cache: one thread
     Box box_;

@@ -14,6 +14,7 @@ public:
     virtual ~HoleRegion() = default;
     virtual Box box() const = 0;   ///< holds it, with a margin; random centres are drawn here
     virtual Box tight() const = 0; ///< holds it, and no more
+    virtual double volume_m3() const = 0;
     virtual bool inside(const Vec3& p) const = 0;
     virtual bool meets(const Sphere& ball) const = 0;
 };

@@ -126,17 +126,25 @@ PlacedHoles place_density(const Law& law, const Placement& p, const HoleRegion& 
                           Progress* progress) {
     HoleSource source(law, p, region, stationary_box(law, p, region), p.seed);
     const Thinning thinning(p, region);
-    const double mean = source.mean_count(*p.density_m3);
+    // Joints pass the solid, so they are denser in it than around it: of their holes so many are
+    // taken that as many centres as the density says lie inside.
+    const bool joints = is<JointsPattern>(p.pattern);
+    const double mean =
+        joints ? *p.density_m3 * region.volume_m3() : source.mean_count(*p.density_m3);
     if (mean > static_cast<double>(kMaxHoles))
         refuse("the density asks for " + std::to_string(mean) +
                " holes, at most 1e8 are placed; use a larger scale or a smaller solid");
     const std::uint64_t n = poisson_count(mean, {p.seed, kCountStream});
     source.lay_out(static_cast<double>(n), progress);
     PlacedHoles placed;
-    for (std::uint64_t i = 0; i < n; ++i) {
+    std::uint64_t n_counted = 0;
+    for (std::uint64_t i = 0; n_counted < n; ++i) {
         if (i % 65536 == 0)
             check_cancelled(progress);
+        if (n_counted < i / kCentersPerHole)
+            refuse_thin(p);
         const Sphere hole = source.hole(i);
+        n_counted += !joints || region.inside(hole.center);
         if (!thinning.keeps(i, hole.center))
             continue;
         if (region.meets(hole))

@@ -72,7 +72,7 @@ struct PlacedHoles {
 /// `porosity`: centres of a stationary process, so they may lie outside by a radius; holes that
 /// miss the solid are dropped; `porosity` takes the first holes of a stream, as many as come
 /// nearest to the target; where one large hole steps over it, other streams of the same seed are
-/// tried in turn. Clusters and joints have the density on average over the box.
+/// tried in turn. Clusters have the density on average over many; joints have it inside the solid.
 ///
 /// The same on any number of threads. A longer list (more `count`) begins with the shorter one, but
 /// for a hard core: it is laid out together, largest ball first, because small ones would leave no
