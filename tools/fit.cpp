@@ -135,11 +135,20 @@ PhotoMask parse_mask(const std::string& text) {
     return {text.substr(0, equals), text.substr(equals + 1)};
 }
 
+/// People think of a bar in centimetres; a bare number would be taken for metres.
+double bar_length_m(const std::string& text) {
+    if (parse_number(text))
+        throw Error(Fault::bad_argument, "--scale-bar: '" + printable(text) +
+                                             "' has no unit; write " + text + "cm or " + text +
+                                             "m");
+    return length_m("--scale-bar", text);
+}
+
 Measurements read(FitArgs& args) {
     if (!args.unit.empty())
         args.settings.unit = unit_from_name(args.unit);
     if (!args.scale_bar.empty())
-        args.settings.scale_bar_m = length_m("--scale-bar", args.scale_bar);
+        args.settings.scale_bar_m = bar_length_m(args.scale_bar);
     for (const std::string& mask : args.masks)
         args.settings.masks.push_back(parse_mask(mask));
     if (args.counting == "whole")
@@ -233,10 +242,9 @@ std::string format_report(const FitArgs& args, const Measurements& measurements,
 }
 
 /// Whether the sample obeys the law of a file. Returns the keys of the JSON result.
-nlohmann::ordered_json judge(const FitArgs& args, const Measurements& measurements,
-                             const Console& console) {
+nlohmann::ordered_json judge(const FitArgs& args, const LawFile& asked,
+                             const Measurements& measurements, const Console& console) {
     const Sample& sample = measurements.sample;
-    const LawFile asked = read_law_file(args.expect);
     double scale = 1;
     if (!args.expect_scale.empty()) {
         if (sample.unit != LengthUnit::metre)
@@ -297,6 +305,9 @@ void check_outputs(const FitArgs& args, const Console& console) {
 
 void run(FitArgs& args, const Console& console) {
     check_outputs(args, console);
+    std::optional<LawFile> asked;
+    if (!args.expect.empty())
+        asked = read_law_file(args.expect);
     const Measurements measurements = read(args);
     for (const std::string& warning : measurements.warnings)
         console.say_text(warning);
@@ -326,9 +337,9 @@ void run(FitArgs& args, const Console& console) {
         console.say("{}: the law", args.out.string());
     }
     auto json = nlohmann::ordered_json::parse(law);
-    if (args.expect.empty())
+    if (!asked)
         return console.result(json);
-    auto verdict = judge(args, measurements, console);
+    auto verdict = judge(args, *asked, measurements, console);
     const bool obeys = verdict["obeys"];
     verdict["law"] = std::move(json);
     console.result(verdict);
@@ -348,8 +359,8 @@ void add_photo_options(CLI::App& verb, FitArgs& args) {
     add("--label", args.settings.label,
         "Only segments with this label are holes [all but 'scale']");
     add("--mask", args.masks,
-        "What was searched of a photo, as PNG, bright there: PHOTO=MASK.png, or MASK.png for the "
-        "only photo [all of it, where its size is known]");
+        "What was searched of a photo, as PNG, bright there: rock-mask.png for rock.jpg, any name "
+        "for the only photo, or PHOTO=MASK.png [all of it, where its size is known]");
     add("--area", args.settings.area, "Area searched in all files together [unit^2]");
     add("--area-factor", args.settings.area_factor,
         "Surface / its image, where the camera looked at a slant: 1 / cos of the angle [1]");

@@ -57,17 +57,8 @@ struct PhotoFiles {
 struct PhotoTotals {
     std::size_t n_photos = 0, n_marked = 0, n_small = 0, n_inside = 0, n_solid = 0;
     double area_m2 = 0, pixel_m = 0, detection_limit_m = 0, scale_bar_m = 0, area_factor = 1;
-    std::string labels, masks; ///< of the first, as fit takes them
 
-    void add(const SectionPhoto& photo, const PhotoFiles& files) {
-        constexpr std::size_t kMostTold = 3;
-        if (n_photos < kMostTold) {
-            labels += " " + files.labels.string();
-            masks += " " + base_name(files.picture) + "=" + files.mask.string();
-        } else if (n_photos == kMostTold) {
-            labels += " ...";
-            masks += " ...";
-        }
+    void add(const SectionPhoto& photo) {
         ++n_photos;
         n_marked += photo.holes.size();
         n_small += photo.n_small;
@@ -119,7 +110,7 @@ PhotoTotals write_photos(const Section& cut, const openvdb::FloatGrid& solid,
                                                 photo.picture.height, segments));
         console.say("{}: {} x {} pixels, {} holes marked", files.labels.string(),
                     photo.picture.width, photo.picture.height, photo.holes.size());
-        totals.add(photo, files);
+        totals.add(photo);
     }
     return totals;
 }
@@ -135,8 +126,10 @@ void tell_photos(const PhotoTotals& totals, const SectionArgs& args, const Conso
                     folder, totals.n_solid);
     if (totals.n_marked == 0)
         return;
-    console.say("fit with: taihu fit{} --mask{} --scale-bar {:.10g}m --detection-limit {:.10g}",
-                totals.labels, totals.masks, totals.scale_bar_m, totals.detection_limit_m);
+    console.say(
+        "fit with: taihu fit {0}/plane-*.json --mask {0}/plane-*-mask.png --scale-bar {1:.10g}m "
+        "--detection-limit {2:.10g}",
+        folder, totals.scale_bar_m, totals.detection_limit_m);
     if (totals.area_factor > 1)
         console.say("the tilt shortens the area that they show: fit with --area-factor {:.6g}, or "
                     "holes per volume come out {:.1f} % too many",

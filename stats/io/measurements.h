@@ -13,7 +13,9 @@ namespace taihu {
 
 /// A picture that says which part of a photo was searched for holes.
 struct PhotoMask {
-    std::string photo;          ///< its name, with or without folders; "": the only photo there is
+    /// Its name, with or without folders; "": the one that the mask is named after, as
+    /// rock-mask.png after rock.jpg, or the only one.
+    std::string photo;
     std::filesystem::path file; ///< PNG of the photo's size, bright where it was searched
 };
 

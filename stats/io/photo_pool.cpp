@@ -120,15 +120,27 @@ void Pool::join_photos() {
     }
 }
 
+/// Is `mask` named after `photo`: plane-1-mask.png after plane-1.jpg, and not after plane-10.jpg?
+bool named_after(const std::filesystem::path& mask, const std::string& photo) {
+    const std::string of = std::filesystem::path(last_part(photo)).stem().string();
+    const std::string name = mask.stem().string();
+    return !of.empty() && name.starts_with(of) &&
+           (name.size() == of.size() || !std::isalnum(static_cast<unsigned char>(name[of.size()])));
+}
+
 void Pool::add_mask(const PhotoMask& mask) {
     const std::string name = base_name(mask.file);
+    const bool any_named = std::any_of(photos_.begin(), photos_.end(), [&](const PooledPhoto& p) {
+        return named_after(mask.file, p.photo.name);
+    });
     const auto refuse_mask = [&](const std::string& what) {
         throw Error(Fault::bad_argument, "mask '" + name + "': " + what);
     };
     PooledPhoto* found = nullptr;
     for (PooledPhoto& p : photos_) {
-        const bool is_it = mask.photo.empty() || p.photo.name == mask.photo ||
-                           last_part(p.photo.name) == mask.photo;
+        const bool is_it = mask.photo.empty() ? !any_named || named_after(mask.file, p.photo.name)
+                                              : p.photo.name == mask.photo ||
+                                                    last_part(p.photo.name) == mask.photo;
         if (is_it && found)
             refuse_mask("both '" + printable(found->photo.name) + "' and '" +
                         printable(p.photo.name) + "' could be its photo; name one of them");

@@ -170,6 +170,10 @@ TEST(Fit, RefusesWhatDoesNotGoTogether) {
     EXPECT_THAT(refusal(kFit + "-q --report r.pdf"), HasSubstr("a .html or a .json"));
     EXPECT_THAT(refusal(kFit + "-q --report law.json -o law.json"), HasSubstr("law.json"));
     EXPECT_THAT(refusal("taihu fit photo.json --expect-scale 1m -q"), HasSubstr("--expect"));
+    EXPECT_THAT(refusal("taihu fit photo.json --scale-bar 40 -q"), HasSubstr("write 40cm or 40m"));
+    // Before anything is written.
+    EXPECT_THAT(refusal(kFit + "--expect none.json -o early.json -q"), HasSubstr("none.json"));
+    EXPECT_FALSE(std::filesystem::exists(folder / "early.json"));
     EXPECT_THAT(refusal("taihu fit photo.json --method thesis --report r.html -q"),
                 HasSubstr("are for --method ml"));
 }

@@ -178,6 +178,20 @@ TEST_F(Photos, AreSearchedWhereTheirMaskIsBright) {
     EXPECT_NEAR(*greatest.sample.area, 280 * 450 / (28.0 * 28 + 46 * 46), 1e-12);
 }
 
+TEST_F(Photos, MasksBelongToThePhotoTheyAreNamedAfter) {
+    for (const char* name : {"rock-10-mask.png", "rock-1-mask.png"}) {
+        const auto file = scratch_ / name;
+        write_file(file, png_of(560, 450, PNG_FORMAT_GRAY,
+                                std::vector<unsigned char>(560 * 450, name[6] == '0' ? 255 : 0)));
+        settings_.masks.push_back({"", file});
+    }
+    const Measurements m = read({labelme_text(eight_holes(), "photos/rock-1.jpg"),
+                                 labelme_text(eight_holes(), "rock-10.jpg")});
+    EXPECT_EQ(m.sample.diameters.size(), 8u); // the first is dark all over
+    EXPECT_TRUE(m.photos[0].masked && m.photos[1].masked);
+    EXPECT_EQ(m.segments[0].photo, 1u);
+}
+
 TEST_F(Photos, RefuseMasksThatDoNotFit) {
     const std::string file = labelme_text(eight_holes());
     add_mask("rock01.jpg", 3, 2, {255, 0, 0, 0, 0, 0});
