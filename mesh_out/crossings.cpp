@@ -1,5 +1,6 @@
 #include "mesh_out/crossings_detail.h"
 
+#include <algorithm>
 #include <array>
 #include <bit>
 #include <optional>
@@ -218,12 +219,14 @@ public:
     struct Face {
         Box box;
         Triangle vertices{};
+        std::uint32_t number = 0;
     };
 
     BoxTree(std::span<const Vec3> positions, std::span<const Triangle> faces)
         : faces_(faces.size()) {
         tbb::parallel_for(std::size_t{0}, faces.size(), [&](std::size_t i) {
             faces_[i].vertices = faces[i];
+            faces_[i].number = static_cast<std::uint32_t>(i);
             for (const std::uint32_t v : faces[i])
                 faces_[i].box.include(positions[v]);
         });
@@ -377,6 +380,49 @@ std::size_t count_crossings(std::span<const Vec3> positions, std::span<const Tri
             return n;
         },
         [](std::size_t a, std::size_t b) { return a + b; });
+}
+
+std::vector<std::array<std::uint32_t, 2>> find_crossings(std::span<const Vec3> positions,
+                                                         std::span<const Triangle> faces,
+                                                         std::span<const char> picked) {
+    std::vector<Triangle> some;
+    std::vector<std::uint32_t> number;
+    const auto has_area = [&](std::size_t i) {
+        return !is_flat(positions[faces[i][0]], positions[faces[i][1]], positions[faces[i][2]]);
+    };
+    for (std::size_t i = 0; i < faces.size(); ++i)
+        if (picked[i] && has_area(i)) {
+            some.push_back(faces[i]);
+            number.push_back(static_cast<std::uint32_t>(i));
+        }
+    std::vector<std::array<std::uint32_t, 2>> pairs;
+    if (some.empty())
+        return pairs;
+    const BoxTree tree(positions, some);
+    constexpr std::size_t kChunk = 4096;
+    std::vector<std::vector<std::array<std::uint32_t, 2>>> found(faces.size() / kChunk + 1);
+    tbb::parallel_for(std::size_t{0}, found.size(), [&](std::size_t chunk) {
+        const std::size_t end = std::min(faces.size(), (chunk + 1) * kChunk);
+        for (std::size_t i = chunk * kChunk; i < end; ++i) {
+            Box box;
+            for (const std::uint32_t v : faces[i])
+                box.include(positions[v]);
+            tree.visit_from(0, box, [&](std::size_t k) {
+                const BoxTree::Face& other = tree.faces()[k];
+                const std::uint32_t n = number[other.number];
+                const auto own = static_cast<std::uint32_t>(i);
+                if (n == own || (picked[i] && n < own) || !BoxTree::overlap(box, other.box) ||
+                    !has_area(i))
+                    return;
+                if (faces_cross(positions, faces[i], other.vertices))
+                    found[chunk].push_back({std::min(own, n), std::max(own, n)});
+            });
+        }
+    });
+    for (const auto& part : found)
+        pairs.insert(pairs.end(), part.begin(), part.end());
+    std::sort(pairs.begin(), pairs.end());
+    return pairs;
 }
 
 } // namespace taihu

@@ -1,6 +1,9 @@
 #pragma once
+#include <array>
 #include <cstddef>
+#include <cstdint>
 #include <span>
+#include <vector>
 
 #include "stats/core/tri_mesh.h"
 
@@ -25,5 +28,12 @@ bool faces_cross(std::span<const Vec3> positions, Triangle f, Triangle g);
 /// Number of pairs of `faces` for which faces_cross() holds; the same on any number of threads.
 /// Time O(n log n + pairs whose boxes overlap), memory about 100 bytes per face.
 std::size_t count_crossings(std::span<const Vec3> positions, std::span<const Triangle> faces);
+
+/// The pairs of which a face is `picked` (one flag per face), each once, the lower number first,
+/// sorted. Time and memory as for the picked faces alone, and a look-up for each of the others.
+/// Faces without area are left out.
+std::vector<std::array<std::uint32_t, 2>> find_crossings(std::span<const Vec3> positions,
+                                                         std::span<const Triangle> faces,
+                                                         std::span<const char> picked);
 
 } // namespace taihu

@@ -13,6 +13,7 @@
 #include <tbb/parallel_for.h>
 #include <tbb/parallel_sort.h>
 
+#include "mesh_out/level_set_check_detail.h"
 #include "stats/core/error.h"
 
 namespace taihu {
@@ -103,6 +104,8 @@ openvdb::FloatGrid::Ptr without_zeros(const openvdb::FloatGrid& solid, float lea
     return copy;
 }
 
+} // namespace
+
 void require_level_set(const openvdb::FloatGrid& solid) {
     const std::string name = "extract: grid '" + solid.getName() + "'";
     if (solid.getGridClass() != openvdb::GRID_LEVEL_SET)
@@ -115,7 +118,17 @@ void require_level_set(const openvdb::FloatGrid& solid) {
                     name + " has voxels that are not cubes; resample it to cubic ones");
 }
 
-} // namespace
+void refuse_empty(const openvdb::FloatGrid& solid) {
+    throw Error(Fault::bad_argument, "extract: grid '" + solid.getName() +
+                                         "' has no surface: nothing is left of the solid; "
+                                         "remove less from it or use smaller voxels");
+}
+
+void refuse_clipped(const openvdb::FloatGrid& solid) {
+    throw Error(Fault::numeric, "extract: the surface of grid '" + solid.getName() +
+                                    "' is open, so it leaves the narrow band; clip or rebuild "
+                                    "the grid as a level set");
+}
 
 TriMesh extract_uniform(const openvdb::FloatGrid& solid, Progress* progress) {
     require_level_set(solid);
@@ -131,13 +144,9 @@ TriMesh extract_uniform(const openvdb::FloatGrid& solid, Progress* progress) {
         mesh = split_quads(*clear, dual_mesh(*clear));
     }
     if (mesh.triangles.empty())
-        throw Error(Fault::bad_argument, "extract: grid '" + solid.getName() +
-                                             "' has no surface: nothing is left of the solid; "
-                                             "remove less from it or use smaller voxels");
+        refuse_empty(solid);
     if (!closed_and_oriented(mesh))
-        throw Error(Fault::numeric, "extract: the surface of grid '" + solid.getName() +
-                                        "' is open, so it leaves the narrow band; clip or rebuild "
-                                        "the grid as a level set");
+        refuse_clipped(solid);
     if (has_equal_positions(mesh) || has_flat_triangles(mesh))
         throw Error(Fault::numeric, "extract: grid '" + solid.getName() +
                                         "' has surface points that float cannot keep apart; move "

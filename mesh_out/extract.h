@@ -1,10 +1,42 @@
 #pragma once
 #include <openvdb/openvdb.h>
 
+#include "mesh_out/labelled_mesh.h"
 #include "stats/core/progress.h"
 #include "stats/core/tri_mesh.h"
+#include "vdb_ops/field.h"
 
 namespace taihu {
+
+struct ExtractSettings {
+    /// Where the surface is smooth, cells grow as long as their faces stay about so near to it
+    /// [voxels], > 0.
+    double bound_vox = 0.1;
+    int most_spacing = 4; ///< largest cells [voxels]: 1, 2 or 4
+};
+
+/// The surface of a solid, straight from its field: sharp along rims and in corners, coarser where
+/// it is smooth. The grid says what is inside, so that pieces that were removed and bubbles that
+/// were filled stay so; the field says where the surface is, and where it does not have the one of
+/// the grid, the grid does.
+///
+/// One vertex for each curve in which the surface passes the faces of a cell of an octree (1, 2 or
+/// 4 voxels, in blocks of 8), on the surface of the field: closed, 2-manifold, outward, no
+/// zero-area triangle, no two vertices in one place; of its topology nothing is lost against voxel
+/// cells. Vertices whose triangles cross others go back into their cell, and cells there stay
+/// small, until none cross. The same bytes on any number of threads.
+///
+/// \param solid  level set: cubic voxels, negative inside, half band >= 2 voxels.
+/// \param field  what it was made of; null: the level set is its own.
+/// \throws Error bad_argument: not a level set, nothing inside it, a setting out of range; numeric:
+/// the surface leaves the narrow band (a clipped grid), or triangles that cross are left;
+/// unsupported: 2^32 vertices; cancelled: between blocks.
+LabelledMesh extract(const openvdb::FloatGrid& solid, const Field* field,
+                     const ExtractSettings& settings = {}, Progress* progress = nullptr);
+
+/// Unit normals for shading, from the gradients of the primitives that vertices lie on; on rims
+/// their mean.
+std::vector<Vec3> surface_normals(const LabelledMesh& mesh, const FieldProbe& field);
 
 /// The zero surface of a level set as a uniform mesh: about two triangles per surface voxel,
 /// closed, 2-manifold, outward, all positions different, no zero-area triangle. OpenVDB's dual

@@ -1,0 +1,368 @@
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+#include <string>
+#include <tuple>
+
+#include <tbb/blocked_range.h>
+#include <tbb/parallel_for.h>
+#include <tbb/parallel_sort.h>
+
+#include "mesh_out/cell_sizes_detail.h"
+#include "mesh_out/crossings_detail.h"
+#include "mesh_out/dual_surface_detail.h"
+#include "mesh_out/extract.h"
+#include "mesh_out/level_set_check_detail.h"
+#include "stats/core/error.h"
+#include "stats/number_detail.h"
+#include "vdb_ops/level_set_probe_detail.h"
+#include "vdb_ops/rasterize.h"
+
+namespace taihu {
+namespace {
+
+constexpr double kReach_vox = 1.25; // a level set of half width 3 tells that much between voxels
+
+/// Calls fn(points, i) for i below n, in parallel, with points for one thread.
+template <class Fn>
+void each(std::size_t n, const SurfacePoints& points, Progress* progress, const Fn& fn) {
+    tbb::parallel_for(tbb::blocked_range<std::size_t>(0, n, 1024), [&](const auto& range) {
+        check_cancelled(progress);
+        const SurfacePoints own = points;
+        for (std::size_t i = range.begin(); i < range.end(); ++i)
+            fn(own, i);
+    });
+}
+
+/// Places the vertices of a dual surface and splits its polygons.
+class Mesher {
+public:
+    Mesher(const CellBlocks& blocks, const DualSurface& surface, const SurfacePoints& points,
+           Progress* progress)
+        : blocks_(blocks), surface_(surface), points_(points), progress_(progress) {}
+
+    LabelledMesh& mesh() { return mesh_; }
+
+    void find_crossings_of(const KnownCrossings& known) {
+        const auto& edges = surface_.edges();
+        crossings_.resize(edges.size());
+        each(edges.size(), points_, progress_, [&](const SurfacePoints& points, std::size_t i) {
+            crossings_[i] = crossing_on(blocks_, points, known, edges[i].block, edges[i].key);
+        });
+        const auto& polygons = surface_.polygons();
+        first_.assign(surface_.n_vertices() + 1, 0);
+        for (const DualPolygon& p : polygons)
+            for (std::size_t k = 0; k < p.n; ++k)
+                ++first_[p.vertices[k] + 1];
+        std::partial_sum(first_.begin(), first_.end(), first_.begin());
+        around_.resize(first_.back());
+        std::vector<std::uint32_t> next(first_.begin(), first_.end() - 1);
+        for (std::uint32_t i = 0; i < polygons.size(); ++i)
+            for (std::size_t k = 0; k < polygons[i].n; ++k)
+                around_[next[polygons[i].vertices[k]]++] = i;
+    }
+
+    void place() {
+        mesh_.positions.resize(surface_.n_vertices());
+        mesh_.labels.resize(surface_.n_vertices());
+        stage_.assign(surface_.n_vertices(), 0);
+        each(surface_.n_vertices(), points_, progress_,
+             [&](const SurfacePoints& points, std::size_t v) {
+                 const auto placed = points.place(crossings_of(v), cell_box(v), slack(v));
+                 mesh_.positions[v] = placed.point;
+                 mesh_.labels[v] = placed.labels;
+             });
+    }
+
+    void split_all() {
+        first_triangle_.resize(surface_.polygons().size() + 1);
+        for (std::size_t i = 0; i < surface_.polygons().size(); ++i)
+            first_triangle_[i + 1] = first_triangle_[i] + surface_.polygons()[i].n - 2u;
+        mesh_.triangles.resize(first_triangle_.back());
+        each(surface_.polygons().size(), points_, progress_,
+             [&](const SurfacePoints& points, std::size_t i) { split(points, i); });
+    }
+
+    /// Vertices go back towards the middle of their cells until no triangles cross. Those of cells
+    /// that cannot be helped so are returned.
+    std::vector<std::uint32_t> retreat() {
+        constexpr int kMostRounds = 16;
+        std::vector<char> picked = doubtful();
+        std::vector<std::uint32_t> hit;
+        for (int round = 0; round < kMostRounds; ++round) {
+            hit = in_trouble(picked);
+            if (hit.empty())
+                break;
+            if (std::all_of(hit.begin(), hit.end(),
+                            [&](std::uint32_t v) { return stage_[v] >= kLastStage; }))
+                break;
+            each(hit.size(), points_, progress_,
+                 [&](const SurfacePoints& points, std::size_t i) { step_back(points, hit[i]); });
+            std::vector<std::uint32_t> polygons;
+            for (const std::uint32_t v : hit)
+                polygons.insert(polygons.end(), around_.begin() + first_[v],
+                                around_.begin() + first_[v + 1]);
+            std::sort(polygons.begin(), polygons.end());
+            polygons.erase(std::unique(polygons.begin(), polygons.end()), polygons.end());
+            std::fill(picked.begin(), picked.end(), 0);
+            each(polygons.size(), points_, progress_,
+                 [&](const SurfacePoints& points, std::size_t i) {
+                     split(points, polygons[i]);
+                     for (auto t = first_triangle_[polygons[i]];
+                          t < first_triangle_[polygons[i] + 1]; ++t)
+                         picked[t] = 1;
+                 });
+        }
+        return hit;
+    }
+
+private:
+    static constexpr std::uint8_t kLastStage = 3;
+
+    std::vector<Crossing> crossings_of(std::size_t v) const {
+        std::vector<Crossing> all;
+        for (std::size_t k = first_[v]; k < first_[v + 1]; ++k)
+            all.push_back(crossings_[around_[k]]);
+        return all;
+    }
+    Box cell_box(std::size_t v) const {
+        const CellRef& cell = surface_.cell(v);
+        const auto at = blocks_[cell.block].origin + CellBlocks::local(cell.first);
+        Box box;
+        box.include(points_.voxel(at));
+        box.include(points_.voxel(at.offsetBy(cell.size)));
+        return box;
+    }
+    double slack(std::size_t v) const {
+        return points_.voxel_m() * (surface_.cell(v).size == 1 ? 1.0 : 0.5);
+    }
+
+    void step_back(const SurfacePoints& points, std::uint32_t v) {
+        Vec3& p = mesh_.positions[v];
+        const Box cell = cell_box(v);
+        stage_[v] = static_cast<std::uint8_t>(std::min<int>(stage_[v] + 1, kLastStage));
+        if (stage_[v] == 1) {
+            p = held(p, cell);
+            mesh_.labels[v] = points.label(p);
+            return;
+        }
+        const Vec3 mean = mean_of(crossings_of(v));
+        if (stage_[v] == 2) {
+            const LabelledPoint on = points.on_face(held(p, cell), cell);
+            p = on.point;
+            mesh_.labels[v] = on.labels;
+        } else {
+            p = mean;
+            mesh_.labels[v] = points.label(p);
+        }
+    }
+
+    void split(const SurfacePoints& points, std::size_t i) {
+        const DualPolygon& polygon = surface_.polygons()[i];
+        Triangle* out = &mesh_.triangles[first_triangle_[i]];
+        const auto& v = polygon.vertices;
+        if (polygon.n == 3) {
+            out[0] = {v[0], v[1], v[2]};
+        } else if (along_first(points, v)) {
+            out[0] = {v[0], v[1], v[2]};
+            out[1] = {v[0], v[2], v[3]};
+        } else {
+            out[0] = {v[1], v[2], v[3]};
+            out[1] = {v[1], v[3], v[0]};
+        }
+    }
+
+    /// Whether to split a quad from its first corner to the third: along a rim, or where the
+    /// diagonal is nearer to the surface, but not so that a triangle turns over.
+    bool along_first(const SurfacePoints& points, const std::array<std::uint32_t, 4>& v) const {
+        const auto& l = mesh_.labels;
+        const Vec3 a = mesh_.positions[v[0]], b = mesh_.positions[v[1]], c = mesh_.positions[v[2]],
+                   d = mesh_.positions[v[3]];
+        const Vec3 n = cross(c - a, d - b);
+        const auto least = [&](const Vec3& p, const Vec3& q, const Vec3& r, const Vec3& s) {
+            const Vec3 x = cross(q - p, r - p), y = cross(r - p, s - p);
+            return std::min(dot(x, n) / std::max(length(x), 1e-300),
+                            dot(y, n) / std::max(length(y), 1e-300));
+        };
+        const double upright = 0.1 * length(n), first = least(a, b, c, d),
+                     second = least(b, c, d, a);
+        if (first < upright && second > first)
+            return false;
+        if (second < upright && first > second)
+            return true;
+        double ac = length(c - a), bd = length(d - b);
+        const bool rim = l[v[0]].size() != 1 ||
+                         !(l[v[0]] == l[v[1]] && l[v[1]] == l[v[2]] && l[v[2]] == l[v[3]]);
+        if (rim) {
+            const double voxel = points.voxel_m();
+            const auto off = [&](const Vec3& p, const Vec3& q, const PrimitiveSet& common) {
+                return std::fabs(points.field().at((p + q) * 0.5).value_m) + 1e-3 * length(p - q) +
+                       (common.size() > 1 ? -0.05
+                        : common.empty()  ? 10.0
+                                          : 0.0) *
+                           voxel;
+            };
+            ac = off(a, c, l[v[0]].common(l[v[2]]));
+            bd = off(b, d, l[v[1]].common(l[v[3]]));
+        }
+        return ac <= bd;
+    }
+
+    /// Triangles that may cross others: at rims, outside of their cells, in cells that the surface
+    /// passes twice.
+    std::vector<char> doubtful() const {
+        std::vector<char> vertex(surface_.n_vertices()), picked(mesh_.triangles.size());
+        tbb::parallel_for(std::size_t{0}, vertex.size(), [&](std::size_t v) {
+            vertex[v] = mesh_.labels[v].size() != 1 || surface_.shares_cell(v) ||
+                        !cell_box(v).contains(mesh_.positions[v]);
+        });
+        tbb::parallel_for(std::size_t{0}, picked.size(), [&](std::size_t t) {
+            for (const std::uint32_t v : mesh_.triangles[t])
+                picked[t] = picked[t] || vertex[v];
+        });
+        return picked;
+    }
+
+    /// The vertices of triangles that cross, have no area, or two vertices in one place.
+    std::vector<std::uint32_t> in_trouble(const std::vector<char>& picked) const {
+        std::vector<std::uint32_t> hit = in_one_place();
+        const auto add = [&](std::size_t t) {
+            hit.insert(hit.end(), mesh_.triangles[t].begin(), mesh_.triangles[t].end());
+        };
+        for (std::size_t t = 0; t < mesh_.triangles.size(); ++t)
+            if (picked[t] && is_needle(mesh_.triangles[t]))
+                add(t);
+        for (const auto& pair : find_crossings(mesh_.positions, mesh_.triangles, picked)) {
+            add(pair[0]);
+            add(pair[1]);
+        }
+        std::sort(hit.begin(), hit.end());
+        hit.erase(std::unique(hit.begin(), hit.end()), hit.end());
+        return hit;
+    }
+    bool is_needle(const Triangle& t) const {
+        constexpr double kThin = 1e-5; // height over length
+        const Vec3 ab = mesh_.positions[t[1]] - mesh_.positions[t[0]],
+                   ac = mesh_.positions[t[2]] - mesh_.positions[t[0]], bc = ac - ab;
+        return length(cross(ab, ac)) <=
+               kThin * std::max({length_squared(ab), length_squared(ac), length_squared(bc)});
+    }
+    std::vector<std::uint32_t> in_one_place() const {
+        std::vector<std::uint32_t> order(mesh_.positions.size());
+        std::iota(order.begin(), order.end(), 0u);
+        const auto key = [&](std::uint32_t v) {
+            const Vec3& p = mesh_.positions[v];
+            return std::tuple(p.x, p.y, p.z, v);
+        };
+        tbb::parallel_sort(order.begin(), order.end(),
+                           [&](std::uint32_t a, std::uint32_t b) { return key(a) < key(b); });
+        std::vector<std::uint32_t> hit;
+        for (std::size_t i = 1; i < order.size(); ++i)
+            if (mesh_.positions[order[i]] == mesh_.positions[order[i - 1]])
+                hit.insert(hit.end(), {order[i - 1], order[i]});
+        return hit;
+    }
+
+    const CellBlocks& blocks_;
+    const DualSurface& surface_;
+    const SurfacePoints& points_;
+    Progress* progress_;
+    std::vector<Crossing> crossings_;           ///< one for each polygon
+    std::vector<std::uint32_t> first_, around_; ///< polygons of vertex v
+    std::vector<std::uint32_t> first_triangle_; ///< of each polygon
+    std::vector<std::uint8_t> stage_;           ///< of retreat
+    LabelledMesh mesh_;
+};
+
+void check_settings(const ExtractSettings& settings) {
+    if (!(settings.bound_vox > 0) || !std::isfinite(settings.bound_vox))
+        throw Error(Fault::bad_argument, "extract: bound_vox is " + shortest(settings.bound_vox) +
+                                             ", must be finite and > 0; 0.1 is usual");
+    if (settings.most_spacing != 1 && settings.most_spacing != 2 && settings.most_spacing != 4)
+        throw Error(Fault::bad_argument, "extract: most_spacing is " +
+                                             std::to_string(settings.most_spacing) +
+                                             ", must be 1, 2 or 4; 4 is usual");
+}
+
+/// All blocks and what vertices may reach from them.
+Box region_of(const CellBlocks& blocks, const Lattice& lattice) {
+    Box box;
+    for (std::size_t b = 0; b < blocks.size(); ++b)
+        for (const int end : {0, 8}) {
+            const auto c = blocks[b].origin.offsetBy(end);
+            box.include(lattice.origin +
+                        Vec3{double(c.x()), double(c.y()), double(c.z())} * lattice.voxel_m);
+        }
+    return box.dilated(4 * lattice.voxel_m);
+}
+
+/// Whether all edges that the surface passes have values at both ends.
+bool in_band(const CellBlocks& blocks, const DualSurface& surface,
+             const openvdb::FloatGrid& solid) {
+    auto accessor = solid.getConstAccessor();
+    return std::all_of(surface.edges().begin(), surface.edges().end(), [&](const auto& e) {
+        openvdb::Coord c = blocks[e.block].origin + CellBlocks::local(e.key % 512);
+        const float one = accessor.getValue(c);
+        ++c[e.key / 512];
+        const float other = accessor.getValue(c);
+        return std::fabs(one) < solid.background() && std::fabs(other) < solid.background();
+    });
+}
+
+} // namespace
+
+LabelledMesh extract(const openvdb::FloatGrid& solid, const Field* field,
+                     const ExtractSettings& settings, Progress* progress) {
+    constexpr int kMostAttempts = 4;
+    check_settings(settings);
+    require_level_set(solid);
+    const Lattice lattice = lattice_of(solid);
+    CellBlocks blocks(solid, progress);
+    if (blocks.size() == 0)
+        refuse_empty(solid);
+    const auto probe = field
+                           ? field->probe(region_of(blocks, lattice), kReach_vox * lattice.voxel_m)
+                           : level_set_probe(solid.deepCopy());
+    const SurfacePoints points(solid, *probe, lattice);
+    SmallCells small;
+    for (int attempt = 0; attempt < kMostAttempts; ++attempt) {
+        const KnownCrossings known = choose_cell_sizes(
+            blocks, points, {settings.most_spacing, settings.bound_vox}, small, progress);
+        const DualSurface surface(blocks, points);
+        if (!in_band(blocks, surface, solid))
+            refuse_clipped(solid);
+        Mesher mesher(blocks, surface, points, progress);
+        mesher.find_crossings_of(known);
+        mesher.place();
+        mesher.split_all();
+        const std::vector<std::uint32_t> stuck = mesher.retreat();
+        if (stuck.empty())
+            return std::move(mesher.mesh());
+        for (const std::uint32_t v : stuck) {
+            const CellRef& cell = surface.cell(v);
+            const auto c = CellBlocks::local(cell.first);
+            for (const int size : {2, 4})
+                small.insert((std::uint64_t{cell.block} * 512 +
+                              CellBlocks::number({c.x() & -size, c.y() & -size, c.z() & -size})) *
+                                 8 +
+                             static_cast<unsigned>(size));
+        }
+    }
+    throw Error(Fault::numeric, "extract: grid '" + solid.getName() +
+                                    "': triangles that cross are left; use a smaller voxel");
+}
+
+std::vector<Vec3> surface_normals(const LabelledMesh& mesh, const FieldProbe& field) {
+    std::vector<Vec3> normals(mesh.positions.size());
+    tbb::parallel_for(std::size_t{0}, normals.size(), [&](std::size_t v) {
+        PrimitiveSet labels = mesh.labels[v];
+        if (labels.empty())
+            labels.add(field.at(mesh.positions[v]).primitive);
+        for (const Primitive p : labels.all())
+            normals[v] += normalized(field.of(p, mesh.positions[v]).gradient);
+        normals[v] = length(normals[v]) > 0 ? normalized(normals[v]) : Vec3{0, 1, 0};
+    });
+    return normals;
+}
+
+} // namespace taihu

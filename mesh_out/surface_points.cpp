@@ -1,0 +1,174 @@
+#include "mesh_out/surface_points_detail.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+namespace taihu {
+namespace {
+
+// In voxels.
+constexpr double kOnEdge = 1e-4, kOnSurface = 1e-3, kFarthest = 4;
+// Normals of one primitive that differ by more than 40 degrees in a cell: it has edges of its own.
+constexpr double kSmoothCosine = 0.77;
+
+std::optional<Vec3> solve(const std::array<double, 6>& a, const Vec3& b) {
+    const double c0 = a[3] * a[5] - a[4] * a[4], c1 = a[2] * a[4] - a[1] * a[5],
+                 c2 = a[1] * a[4] - a[2] * a[3];
+    const double det = a[0] * c0 + a[1] * c1 + a[2] * c2;
+    if (!(det > 1e-12))
+        return std::nullopt;
+    const double c3 = a[0] * a[5] - a[2] * a[2], c4 = a[1] * a[2] - a[0] * a[4],
+                 c5 = a[0] * a[3] - a[1] * a[1];
+    return Vec3{c0 * b.x + c1 * b.y + c2 * b.z, c1 * b.x + c3 * b.y + c4 * b.z,
+                c2 * b.x + c4 * b.y + c5 * b.z} /
+           det;
+}
+
+/// The point nearest to all tangent planes, and a little to their mean.
+std::optional<Vec3> nearest_to_planes(std::span<const Crossing> crossings, const Vec3& mean) {
+    constexpr double kPull = 0.02;
+    std::array<double, 6> a{}; // xx, xy, xz, yy, yz, zz
+    Vec3 b;
+    for (const Crossing& c : crossings) {
+        const Vec3& n = c.normal;
+        const double d = dot(n, c.point - mean);
+        a[0] += n.x * n.x;
+        a[1] += n.x * n.y;
+        a[2] += n.x * n.z;
+        a[3] += n.y * n.y;
+        a[4] += n.y * n.z;
+        a[5] += n.z * n.z;
+        b += n * d;
+    }
+    for (const std::size_t i : {0u, 3u, 5u})
+        a[i] += kPull * static_cast<double>(crossings.size());
+    const auto step = solve(a, b);
+    if (!step)
+        return std::nullopt;
+    return mean + *step;
+}
+
+bool is_smooth(std::span<const Crossing> crossings) {
+    for (std::size_t i = 0; i < crossings.size(); ++i)
+        for (std::size_t k = i + 1; k < crossings.size(); ++k)
+            if (dot(crossings[i].normal, crossings[k].normal) < kSmoothCosine)
+                return false;
+    return true;
+}
+
+} // namespace
+
+Vec3 held(const Vec3& p, const Box& box) {
+    return max(box.lo, min(box.hi, p));
+}
+
+Vec3 mean_of(std::span<const Crossing> crossings) {
+    Vec3 sum;
+    for (const Crossing& c : crossings)
+        sum += c.point;
+    return sum / static_cast<double>(crossings.size());
+}
+
+Crossing SurfacePoints::on_edge(const openvdb::Coord& at, int axis) const {
+    openvdb::Coord next = at;
+    ++next[axis];
+    // Values of the grid to begin with: where a piece went or a bubble was filled the field never
+    // gets to 0 between them.
+    double f0 = static_cast<double>(accessor_.getValue(at)),
+           f1 = static_cast<double>(accessor_.getValue(next));
+    const Vec3 p0 = voxel(at);
+    Vec3 way;
+    way[axis] = lattice_.voxel_m;
+    Crossing c;
+    c.point = p0 + way * std::clamp(f0 / (f0 - f1), 0.0, 1.0);
+    const bool starts_inside = f0 < 0;
+    double t0 = 0, t1 = 1;
+    for (int i = 0; i < 12; ++i) {
+        const double t =
+            i % 3 == 2 ? 0.5 * (t0 + t1) : t0 + (t1 - t0) * std::clamp(f0 / (f0 - f1), 0.02, 0.98);
+        const Vec3 p = p0 + way * t;
+        const FieldProbe::Nearest f = field_.at(p);
+        if (std::fabs(f.value_m) <= kOnEdge * lattice_.voxel_m) {
+            const FieldProbe::Value v = field_.of(f.primitive, p);
+            return {p, normalized(v.gradient), f.primitive, true};
+        }
+        if ((f.value_m < 0) == starts_inside) {
+            t0 = t;
+            f0 = f.value_m;
+        } else {
+            t1 = t;
+            f1 = f.value_m;
+        }
+    }
+    return c;
+}
+
+bool SurfacePoints::is_on(const Vec3& p) const {
+    return std::fabs(field_.at(p).value_m) <= kOnSurface * lattice_.voxel_m;
+}
+
+LabelledPoint SurfacePoints::on_face(const Vec3& p, const Box& cell) const {
+    const FieldProbe::Nearest at = field_.at(p);
+    const auto on = onto(field_, PrimitiveSet(at.primitive), p, kFarthest * lattice_.voxel_m);
+    const Vec3 inside = on ? held(*on, cell) : p;
+    return {inside, label(inside)};
+}
+
+LabelledPoint SurfacePoints::place(std::span<const Crossing> crossings, const Box& cell,
+                                   double slack_m) const {
+    const Vec3 mean = mean_of(crossings);
+    PrimitiveSet set;
+    bool known = true, all_in = true;
+    for (const Crossing& c : crossings) {
+        known = known && c.known;
+        all_in = set.add(c.primitive) && all_in;
+    }
+    if (!known)
+        return {mean, {}};
+    const Box reach = cell.dilated(slack_m);
+    const double farthest = kFarthest * lattice_.voxel_m;
+    if (set.size() == 1 && !is_smooth(crossings)) {
+        if (const auto p = nearest_to_planes(crossings, mean)) {
+            const Vec3 in = held(*p, cell.dilated(0.25 * slack_m));
+            if (std::fabs(field_.at(in).value_m) <= 0.1 * lattice_.voxel_m)
+                return {in, set};
+        }
+    }
+    const auto settle = [&](PrimitiveSet s) -> std::optional<LabelledPoint> {
+        for (int i = 0; i < 3; ++i) {
+            const auto p = onto(field_, s, mean, farthest);
+            if (!p || !reach.contains(*p))
+                return std::nullopt;
+            const FieldProbe::Nearest there = field_.at(*p);
+            if (std::fabs(there.value_m) <= kOnSurface * lattice_.voxel_m)
+                return LabelledPoint{*p, s};
+            const std::size_t before = s.size(); // another primitive cuts it off there
+            if (!s.add(there.primitive) || s.size() == before)
+                return std::nullopt;
+        }
+        return std::nullopt;
+    };
+    if (const auto found = settle(set); found && all_in)
+        return *found;
+    for (std::size_t i = 0; i < set.size() && set.size() == 3; ++i) {
+        PrimitiveSet two;
+        for (std::size_t k = 0; k < 3; ++k)
+            if (k != i)
+                two.add(set[k]);
+        const auto p = onto(field_, two, mean, farthest);
+        if (p && reach.contains(*p) && is_on(*p))
+            return {*p, two};
+    }
+    return on_face(mean, cell);
+}
+
+bool SurfacePoints::joins(const std::array<openvdb::Coord, 4>& corners) const {
+    std::array<double, 4> v;
+    for (std::size_t k = 0; k < 4; ++k)
+        v[k] = static_cast<double>(accessor_.getValue(corners[k]));
+    const bool first_inside = v[0] < 0;
+    return first_inside ? v[0] * v[2] > v[1] * v[3] : v[1] * v[3] > v[0] * v[2];
+}
+
+} // namespace taihu
