@@ -3,22 +3,25 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
+#include <memory>
+#include <optional>
 #include <utility>
 
 #include <nlohmann/json.hpp>
 
 #include "mesh_out/extract.h"
-#include "mesh_out/simplify.h"
-#include "mesh_out/surface_distance.h"
+#include "mesh_out/field_distance.h"
+#include "mesh_out/openness.h"
 #include "stats/core/error.h"
+#include "vdb_ops/placed_level_set_field.h"
+#include "vdb_ops/rasterize.h"
 
 namespace taihu {
 namespace {
 
-constexpr double kRoundingShare = 0.1;     ///< of a bound, for moving vertices onto the grid
-constexpr double kSimplifyingShare = 0.82; ///< of a bound; what is left covers what samples miss
-constexpr double kTightest = 0.75; ///< by how much one more attempt may lower the inner bound
-constexpr int kAttempts = 4;
+constexpr double kRoundingShare = 0.1; ///< of a bound, for moving vertices onto the grid
+constexpr double kTightest = 0.75;     ///< by how much one more attempt may lower the inner bound
+constexpr int kAttempts = 4, kMostLevels = 8;
 constexpr int kReportVersion = 1;
 
 std::string shown(double value) {
@@ -31,59 +34,102 @@ void require(const LodSettings& settings) {
     const auto refuse = [](const std::string& what) {
         throw Error(Fault::bad_argument, "lod: " + what);
     };
-    if (settings.n_levels < 1 || settings.n_levels > 8)
-        refuse("n_levels is " + std::to_string(settings.n_levels) + ", must be 1..8");
-    if (!(settings.bound_m > 0) || !std::isfinite(settings.bound_m))
-        refuse("bound_m is " + shown(settings.bound_m) + ", must be finite and > 0");
-    if (!(settings.factor > 1) || !std::isfinite(settings.factor))
-        refuse("factor is " + shown(settings.factor) + ", must be finite and > 1");
+    const std::vector<LodGoal>& levels = settings.levels;
+    if (levels.empty() || levels.size() > kMostLevels)
+        refuse(std::to_string(levels.size()) + " levels, must be 1..8");
+    for (std::size_t j = 0; j < levels.size(); ++j) {
+        const std::string which = "level " + std::to_string(j);
+        const auto [bound_m, n] = levels[j];
+        if ((bound_m != 0) == (n != 0))
+            refuse(which + ": give a bound or a number of triangles");
+        if (n == 0 && (!(bound_m > 0) || !std::isfinite(bound_m)))
+            refuse(which + ": bound_m is " + shown(bound_m) + ", must be finite and > 0");
+        if (n != 0 && n < 4)
+            refuse(which + ": " + std::to_string(n) + " triangles, a solid has at least 4");
+        if (j > 0 && n == 0 && levels[j - 1].n_triangles == 0 && bound_m <= levels[j - 1].bound_m)
+            refuse(which + ": bound_m is " + shown(bound_m) +
+                   ", must be greater than that of the level before");
+        if (j > 0 && n != 0 && levels[j - 1].n_triangles != 0 && n >= levels[j - 1].n_triangles)
+            refuse(which + ": " + std::to_string(n) +
+                   " triangles, must be fewer than the level before");
+    }
+}
+
+double power_of_two_below(double x) {
+    return std::exp2(std::floor(std::log2(x)));
 }
 
 /// Makes the levels of one solid.
 class Chain {
 public:
-    Chain(const openvdb::FloatGrid& solid, const LodSettings& settings, Progress* progress)
-        : solid_(solid), settings_(settings), progress_(progress),
-          reference_((report_stage(progress, "extract"), extract_uniform(solid, progress))),
-          box_(bounds(reference_)) {
-        origin_step_m_ = position_grid(box_, max_move_m(bound_m(settings.n_levels - 1))).step_m;
-        const double least_step = std::exp2(std::ceil(std::log2(box_.longest() / 0x1p17)));
-        if (max_move_m(bound_m(0)) < least_step * std::sqrt(3.0) / 2)
-            throw Error(Fault::numeric,
-                        "lod: a largest error of " + shown(bound_m(0)) +
-                            " m is finer than positions of 18 bits; allow at least " +
-                            shown(least_step * std::sqrt(3.0) / 2 / kRoundingShare * 1.001) + " m");
-    }
-
+    Chain(const openvdb::FloatGrid& solid, const Field* field, const LodSettings& settings,
+          Progress* progress);
     LodChain make();
 
 private:
-    double bound_m(int j) const { return settings_.bound_m * std::pow(settings_.factor, j); }
+    double finest_bound_m() const;
     /// What rounding may take of a bound; a step as long as the mesh itself would help nobody.
     double max_move_m(double bound_m) const {
         return std::min(kRoundingShare * bound_m, box_.longest() / 8);
     }
-    LodLevel written(const TriMesh& mesh, double bound_m) const;
-    bool next_level(int j, LodLevel& level);
-    [[noreturn]] void refuse_bound(double bound_m, double error_m) const;
+    LodLevel written(const BoundedMesh& mesh, double bound_m) const;
+    bool within(double bound_m, LodLevel& level);
+    LodLevel of_triangles(std::size_t n);
 
-    const openvdb::FloatGrid& solid_;
     const LodSettings& settings_;
     Progress* progress_;
-    const TriMesh reference_;
-    const Box box_;
+    const double voxel_m_;
+    std::unique_ptr<const Field> own_; ///< where none was given
+    LabelledMesh sharp_;
+    TriMesh reference_;
+    Box box_;
+    std::unique_ptr<const FieldProbe> probe_;
     double origin_step_m_ = 0;
-    TriMesh current_; ///< the last level before it was moved onto its grid
+    std::optional<BoundedSimplifier> last_; ///< as the last level left it
 };
 
+/// The finest bound that is asked for; a fraction of a voxel where only triangles are.
+double Chain::finest_bound_m() const {
+    const double bound_m = settings_.levels.front().bound_m;
+    return bound_m > 0 ? bound_m : 0.25 * voxel_m_;
+}
+
+Chain::Chain(const openvdb::FloatGrid& solid, const Field* field, const LodSettings& settings,
+             Progress* progress)
+    : settings_(settings), progress_(progress), voxel_m_(lattice_of(solid).voxel_m) {
+    report_stage(progress, "extracting the surface");
+    const double bound_vox = std::clamp(0.25 * finest_bound_m() / voxel_m_, 0.05, 0.5);
+    sharp_ = extract(solid, field, {.bound_vox = bound_vox}, progress);
+    reference_ = {sharp_.positions, sharp_.triangles, {}};
+    box_ = bounds(reference_);
+    origin_step_m_ = power_of_two_below(box_.longest() / 8);
+    const double finest_m = finest_grid(box_).step_m * std::sqrt(3.0) / 2;
+    if (settings.levels.front().bound_m > 0 && max_move_m(finest_bound_m()) < finest_m)
+        throw Error(Fault::numeric, "lod: a largest error of " + shown(finest_bound_m()) +
+                                        " m is finer than positions of 18 bits; allow at least " +
+                                        shown(finest_m / kRoundingShare * 1.001) + " m");
+    if (!field) {
+        own_ = std::make_unique<PlacedLevelSetField>(solid.copy()); // its band may be widened
+        field = own_.get();
+    }
+    double largest_m = finest_bound_m();
+    for (const LodGoal& goal : settings.levels)
+        largest_m = std::max(largest_m, goal.n_triangles > 0 ? box_.longest() / 8 : goal.bound_m);
+    const double reach_m = 8 * (voxel_m_ + largest_m);
+    probe_ = field->probe(box_.dilated(reach_m), reach_m);
+    last_.emplace(sharp_, *probe_, BoundedSettings{.spacing_m = voxel_m_});
+}
+
 /// `mesh` as a file holds it: snapped, coded, decoded; certified and measured as decoded.
-LodLevel Chain::written(const TriMesh& mesh, double bound_m) const {
+LodLevel Chain::written(const BoundedMesh& mesh, double bound_m) const {
     LodLevel level;
     level.bound_m = bound_m;
+    level.unresolved = mesh.unresolved;
     level.grid = position_grid(box_, max_move_m(bound_m), origin_step_m_);
-    TriMesh snapped = snap_to_grid(mesh, level.grid).mesh;
-    if (settings_.normals)
-        snapped.normals = surface_normals(solid_, snapped.positions);
+    TriMesh plain{mesh.mesh.positions, mesh.mesh.triangles, surface_normals(mesh.mesh, *probe_)};
+    TriMesh snapped = snap_to_grid(plain, level.grid).mesh;
+    if (settings_.openness)
+        snapped.openness = openness(snapped, {}, progress_);
     check_cancelled(progress_);
     level.encoded = encode_draco(snapped, level.grid);
     const TriMesh& decoded = level.encoded.decoded;
@@ -96,63 +142,67 @@ LodLevel Chain::written(const TriMesh& mesh, double bound_m) const {
                                         " m came out with " + what + "; use a smaller bound");
     }
     check_cancelled(progress_);
+    std::vector<Sphere> apart;
+    for (const UnresolvedPlace& place : mesh.unresolved)
+        apart.push_back({place.center, place.radius_m + bound_m});
     // Half a voxel is finer than the reference's own faces; a wide bound need not be known so well.
-    const double spacing_m = std::max(0.5 * solid_.voxelSize()[0], 0.5 * bound_m);
-    const TwoSidedDistance distance = two_sided_distance(decoded, reference_, spacing_m);
+    const FieldDistance distance = field_distance(
+        decoded, *probe_, reference_, std::max(0.5 * voxel_m_, 0.5 * bound_m), apart, progress_);
     level.error_m = distance.max_m;
     level.rms_m = distance.rms_m;
-    check_cancelled(progress_);
+    level.unresolved_error_m = distance.max_apart_m;
     return level;
 }
 
-void Chain::refuse_bound(double bound_m, double error_m) const {
-    throw Error(Fault::numeric, "lod: the bound " + shown(bound_m) +
-                                    " m cannot be met, the best mesh is " + shown(error_m) +
-                                    " m off; ask for " + shown(1.05 * error_m) +
-                                    " m or more, or use smaller voxels");
+/// A level within a bound, from the one before. Returns false, and what was nearest to it in
+/// `level`, when rounding does not let it stay within.
+bool Chain::within(double bound_m, LodLevel& level) {
+    double inner_m = bound_m - max_move_m(bound_m);
+    for (int attempt = 0; attempt < kAttempts; ++attempt) {
+        BoundedSimplifier next = *last_;
+        level = written(next.within(inner_m, progress_), bound_m);
+        if (level.error_m <= bound_m) {
+            last_.emplace(std::move(next));
+            return true;
+        }
+        inner_m *= std::max(kTightest, 0.97 * bound_m / level.error_m);
+    }
+    return false;
 }
 
-/// Level j from current_, or false when nothing within its bound has fewer triangles. Level 0 may
-/// fall back to the uniform mesh itself.
-bool Chain::next_level(int j, LodLevel& level) {
-    const TriMesh& start = j == 0 ? reference_ : current_;
-    double inner_m = kSimplifyingShare * bound_m(j);
-    for (int attempt = 0; attempt < kAttempts; ++attempt) {
-        TriMesh simplified = simplify(start, reference_, {.bound_m = inner_m}, progress_);
-        if (j > 0 && simplified.triangles.size() >= start.triangles.size())
-            return false;
-        level = written(simplified, bound_m(j));
-        if (level.error_m > level.bound_m) {
-            inner_m *= std::max(kTightest, 0.97 * level.bound_m / level.error_m);
-            continue;
-        }
-        current_ = std::move(simplified);
-        return true;
-    }
-    if (j > 0)
-        return false;
-    level = written(reference_, bound_m(0));
-    if (level.error_m > level.bound_m)
-        refuse_bound(level.bound_m, level.error_m);
-    current_ = reference_;
-    return true;
+/// A level of so many triangles, whatever its bound then is.
+LodLevel Chain::of_triangles(std::size_t n) {
+    const BoundedMesh mesh = last_->to_triangles(n, progress_);
+    LodLevel level = written(mesh, mesh.bound_m / (1 - kRoundingShare));
+    level.bound_m = std::max(level.bound_m, level.error_m);
+    return level;
 }
 
 LodChain Chain::make() {
     LodChain chain;
     chain.n_reference_triangles = reference_.triangles.size();
-    for (int j = 0; j < settings_.n_levels; ++j) {
-        report_stage(progress_, "level " + std::to_string(j + 1) + " of " +
-                                    std::to_string(settings_.n_levels));
+    const std::size_t n = settings_.levels.size();
+    for (std::size_t j = 0; j < n; ++j) {
+        report_stage(progress_, "level " + std::to_string(j + 1) + " of " + std::to_string(n));
         check_cancelled(progress_);
+        const LodGoal& goal = settings_.levels[j];
         LodLevel level;
-        const bool made = next_level(j, level);
-        if (j > 0 && (!made || level.certificate.n_triangles >=
+        bool made = true;
+        if (goal.n_triangles > 0)
+            level = of_triangles(goal.n_triangles);
+        else
+            made = within(goal.bound_m, level);
+        if (!made && j == 0)
+            throw Error(Fault::numeric, "lod: the bound " + shown(level.bound_m) +
+                                            " m cannot be met, the best mesh is " +
+                                            shown(level.error_m) + " m off; ask for " +
+                                            shown(1.05 * level.error_m) +
+                                            " m or more, or use smaller voxels");
+        if (!made || (j > 0 && level.certificate.n_triangles >=
                                    chain.levels.back().certificate.n_triangles)) {
-            chain.note = std::to_string(j) + " of " + std::to_string(settings_.n_levels) +
-                         " levels: within " + shown(bound_m(j)) +
-                         " m no mesh with fewer triangles than level " + std::to_string(j - 1) +
-                         " was found";
+            chain.note = std::to_string(j) + " of " + std::to_string(n) + " levels: within " +
+                         shown(level.bound_m) + " m no mesh with fewer triangles than level " +
+                         std::to_string(j - 1) + " was found";
             break;
         }
         if (j > 0)
@@ -162,10 +212,15 @@ LodChain Chain::make() {
     return chain;
 }
 
-/// MSFT_screencoverage of each level: the share of a screen of 1920 x 1080 pixels that the box's
-/// largest face covers where a pixel is as wide as the error of the *next* level; from there on the
-/// next one looks the same. At most 1, each at most half of the one before; the last is the size
-/// below which the rock may be dropped: 1e-4, or less where the levels reach that far down.
+} // namespace
+
+std::vector<LodGoal> bounds_by_factor(int n_levels, double bound_m, double factor) {
+    std::vector<LodGoal> goals;
+    for (int j = 0; j < n_levels; ++j)
+        goals.push_back({bound_m * std::pow(factor, j), 0});
+    return goals;
+}
+
 std::vector<double> screen_coverages(const LodChain& chain) {
     std::vector<double> coverages;
     constexpr double kPixels = 1920.0 * 1080.0, kCull = 1e-4;
@@ -182,12 +237,10 @@ std::vector<double> screen_coverages(const LodChain& chain) {
     return coverages;
 }
 
-} // namespace
-
-LodChain make_lods(const openvdb::FloatGrid& solid, const LodSettings& settings,
+LodChain make_lods(const openvdb::FloatGrid& solid, const Field* field, const LodSettings& settings,
                    Progress* progress) {
     require(settings);
-    return Chain(solid, settings, progress).make();
+    return Chain(solid, field, settings, progress).make();
 }
 
 std::string format_glb(const LodChain& chain, const GlbSettings& settings) {
@@ -200,14 +253,32 @@ std::string format_glb(const LodChain& chain, const GlbSettings& settings) {
     return format_glb(levels, settings);
 }
 
+namespace {
+
+/// The largest of them: thousands help nobody.
+nlohmann::ordered_json places_json(std::vector<UnresolvedPlace> places) {
+    constexpr std::size_t kMost = 100;
+    std::stable_sort(places.begin(), places.end(),
+                     [](const auto& a, const auto& b) { return a.radius_m > b.radius_m; });
+    auto json = nlohmann::ordered_json{{"n", places.size()}, {"largest", nlohmann::json::array()}};
+    for (std::size_t i = 0; i < std::min(kMost, places.size()); ++i) {
+        const Vec3& c = places[i].center;
+        json["largest"].push_back(
+            {{"center_m", {c.x, c.y, c.z}}, {"radius_m", places[i].radius_m}});
+    }
+    return json;
+}
+
+} // namespace
+
 std::string format_report(const LodChain& chain, const std::string& file) {
     const std::vector<double> coverages = screen_coverages(chain);
     nlohmann::ordered_json report;
     report["taihu_report"] = kReportVersion;
     report["file"] = file;
     report["reference"] =
-        "uniform surface of the level set; distances by closest point, both ways, "
-        "on the decoded meshes";
+        "surface of the field, or of the level set where there is none; distances by closest "
+        "point, both ways, on the decoded meshes, outside of the places listed";
     report["n_reference_triangles"] = chain.n_reference_triangles;
     report["note"] = chain.note;
     report["levels"] = nlohmann::ordered_json::array();
@@ -229,7 +300,9 @@ std::string format_report(const LodChain& chain, const std::string& file) {
                                     {"area_m2", c.area_m2},
                                     {"n_self_intersections", c.n_self_intersections},
                                     {"position_step_m", level.grid.step_m},
-                                    {"position_bits", level.grid.bits}});
+                                    {"position_bits", level.grid.bits},
+                                    {"unresolved", places_json(level.unresolved)},
+                                    {"unresolved_error_m", level.unresolved_error_m}});
     }
     return report.dump(2) + "\n";
 }

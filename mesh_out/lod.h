@@ -5,19 +5,28 @@
 
 #include <openvdb/openvdb.h>
 
+#include "mesh_out/bounded_simplify.h"
 #include "mesh_out/certificate.h"
 #include "mesh_out/io/glb.h"
 #include "mesh_out/position_grid.h"
 #include "stats/core/progress.h"
 #include "stats/core/tri_mesh.h"
+#include "vdb_ops/field.h"
 
 namespace taihu {
 
+/// What a level is asked for: a bound of its error, or a number of triangles. One of them is 0.
+struct LodGoal {
+    double bound_m = 0;
+    std::size_t n_triangles = 0; ///< reached within 2 %, at least 4
+};
+
+/// \p n_levels bounds, each \p factor times the one before.
+std::vector<LodGoal> bounds_by_factor(int n_levels, double bound_m, double factor);
+
 struct LodSettings {
-    int n_levels = 4;    ///< 1..8
-    double bound_m = 0;  ///< of level 0 [m], > 0
-    double factor = 2;   ///< level j has bound_m * factor^j; > 1
-    bool normals = true; ///< vertex normals from the level set
+    std::vector<LodGoal> levels; ///< finest first, 1..8: bounds rise, numbers of triangles fall
+    bool openness = true;        ///< ambient occlusion of each vertex
 };
 
 /// One level, as the decoded file holds it.
@@ -26,28 +35,38 @@ struct LodLevel {
     PositionGrid grid;
     Certificate certificate; ///< of the decoded mesh
     double bound_m = 0;      ///< promised: error_m <= bound_m
-    double error_m = 0; ///< measured on the decoded mesh, both ways, against the uniform surface
+    double error_m = 0;      ///< measured on the decoded mesh, both ways, outside `unresolved`
     double rms_m = 0;
     std::int64_t holes_closed = 0; ///< tunnels of level 0 that this level lacks
+    /// Walls and slits thinner than a voxel, where no bound is promised.
+    std::vector<UnresolvedPlace> unresolved;
+    double unresolved_error_m = 0; ///< measured there
 };
 
 struct LodChain {
     std::vector<LodLevel> levels;          ///< finest first, triangle counts strictly decreasing
-    std::size_t n_reference_triangles = 0; ///< of the uniform surface that errors refer to
+    std::size_t n_reference_triangles = 0; ///< of the sharp surface that all levels are made of
     std::string note;                      ///< why there are fewer levels than asked for, or empty
 };
 
-/// Levels of detail of a solid under world-space bounds. Each is simplified from the one before,
-/// moved onto its position grid, Draco-coded, decoded, certified and measured; a level that misses
-/// its bound is made again with a tighter inner one. Deterministic on any number of threads. \param
-/// solid  level set [m], negative inside. \throws Error bad_argument; numeric: the bound cannot be
-/// met (the message says what can), or a level
-///   that would break the certificate; cancelled.
-LodChain make_lods(const openvdb::FloatGrid& solid, const LodSettings& settings,
+/// Levels of detail of a solid under world-space bounds, sharp where primitives of the field meet.
+/// Each is simplified from the one before under a bound of its true distance to the field's
+/// surface, moved onto its position grid, Draco-coded, decoded, certified and measured; a level
+/// that misses its bound is made again with a tighter inner one. Normals are the field's. The same
+/// bytes on any number of threads. \param solid  level set [m], negative inside. \param field  what
+/// it was made of; null: the level set is its own. \throws Error bad_argument; numeric: the bound
+/// cannot be met (the message says what can), or a level that would break the certificate;
+/// cancelled.
+LodChain make_lods(const openvdb::FloatGrid& solid, const Field* field, const LodSettings& settings,
                    Progress* progress = nullptr);
 
-/// The chain as one GLB; screen coverages follow from the errors: a level is used until its error
-/// would pass one pixel of a screen 1080 pixels high.
+/// MSFT_screencoverage of each level: the share of a screen of 1920 x 1080 pixels that the box's
+/// largest face covers where a pixel is as wide as the error of the *next* level; from there on the
+/// next one looks the same. At most 1, each at most half of the one before; the last is the size
+/// below which the rock may be dropped: 1e-4, or less where the levels reach that far down.
+std::vector<double> screen_coverages(const LodChain& chain);
+
+/// The chain as one GLB.
 std::string format_glb(const LodChain& chain, const GlbSettings& settings = {});
 
 /// report.json of the chain (data/schema/report.schema.json): `levels` [{triangles, bytes, error_m,

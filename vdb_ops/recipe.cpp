@@ -23,7 +23,18 @@ std::string node(const char* kind, Json body) {
 }
 
 Json lod_json(const RecipeLod& lod) {
-    return {{"levels", lod.n_levels}, {"bound_m", lod.bound_m}, {"factor", lod.factor}};
+    Json json;
+    if (lod.uniform())
+        json["uniform"] = true;
+    else if (lod.bounds_m.empty())
+        json["triangles"] = lod.triangles;
+    else
+        json["bounds_m"] = lod.bounds_m;
+    if (!lod.openness)
+        json["openness"] = false;
+    if (lod.at_foot)
+        json["origin"] = "foot";
+    return json;
 }
 
 /// Null for holes anywhere.

@@ -2,6 +2,7 @@
 #include <cstdint>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "stats/io/measurements.h"
 #include "vdb_ops/place.h"
@@ -34,9 +35,13 @@ std::string difference_node(const std::string& of, const std::string& minus);
 std::string clean_node(const std::string& of, std::optional<std::size_t> n_pieces,
                        bool fill_bubbles);
 
+/// How a recipe's surface is written; meshes other than GLB are its first level.
 struct RecipeLod {
-    int n_levels = 1;
-    double bound_m = 0, factor = 2;
+    std::vector<double> bounds_m;         ///< of each level, finest first, or
+    std::vector<std::uint64_t> triangles; ///< how many each has, or neither:
+    bool uniform() const { return bounds_m.empty() && triangles.empty(); } ///< the plain extraction
+    bool openness = true; ///< ambient occlusion in a GLB's vertex colours
+    bool at_foot = false; ///< the origin is moved to the middle of the foot
 };
 
 /// The whole recipe. \param voxel_m  of the lattice.

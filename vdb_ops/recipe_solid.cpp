@@ -19,6 +19,7 @@ using nlohmann::json;
 using nlohmann::ordered_json;
 
 constexpr int kVersion = 1, kDefaultDim = 256;
+constexpr std::size_t kMostLevels = 8;
 constexpr double kMostSeed = 1.8446744073709551e19;
 constexpr std::string_view kRequired[] = {"taihu_recipe", "solid"};
 constexpr std::string_view kOptional[] = {"seed", "voxel_m", "dim", "material",
@@ -51,15 +52,70 @@ std::uint64_t seed_of(const json& recipe, const std::string& where,
     return recipe["seed"].get<std::uint64_t>();
 }
 
+/// Two numbers or more of one kind, rising or falling.
+template <class Number>
+std::vector<Number> level_list(const json& lod, const std::string& where, std::string_view key,
+                               double lo, double hi, bool rising) {
+    const json& list = lod[std::string(key)];
+    if (!list.is_array() || list.empty() || list.size() > kMostLevels)
+        throw Error(Fault::bad_input,
+                    where + ": '" + std::string(key) + "' must be a list of 1 to 8 numbers");
+    std::vector<Number> out;
+    for (const json& number : list) {
+        const double value = json_number({{std::string(key), number}}, where, key, lo, hi);
+        if (!out.empty() && (value > static_cast<double>(out.back())) != rising)
+            throw Error(Fault::bad_input, where + ": '" + std::string(key) + "' must " +
+                                              (rising ? "rise" : "fall") + ", finest level first");
+        out.push_back(static_cast<Number>(value));
+    }
+    return out;
+}
+
+bool json_flag(const json& object, const std::string& where, const std::string& key,
+               bool otherwise) {
+    if (!object.contains(key))
+        return otherwise;
+    if (!object[key].is_boolean())
+        throw Error(Fault::bad_input, where + ": '" + key + "' must be true or false");
+    return object[key].get<bool>();
+}
+
+/// Exactly one of: `levels` with `bound_m` and `factor`, `bounds_m`, `triangles`, `uniform`.
 std::optional<RecipeLod> lod_of(const json& recipe, const std::string& where, double scale) {
     if (!recipe.contains("lod"))
         return std::nullopt;
-    static constexpr std::string_view kKeys[] = {"levels", "bound_m", "factor"};
+    static constexpr std::string_view kKeys[] = {"levels",    "bound_m", "factor",   "bounds_m",
+                                                 "triangles", "uniform", "openness", "origin"};
     const std::string inside = where + ": lod";
-    check_keys(recipe["lod"], inside, kKeys);
-    return RecipeLod{static_cast<int>(json_number(recipe["lod"], inside, "levels", 1, 8)),
-                     scale * json_number(recipe["lod"], inside, "bound_m", 1e-9, 1e6),
-                     json_number(recipe["lod"], inside, "factor", 1.01, 100)};
+    const json& json = recipe["lod"];
+    check_keys(json, inside, {}, kKeys);
+    RecipeLod lod;
+    const auto kinds = json.contains("levels") + json.contains("bounds_m") +
+                       json.contains("triangles") + json_flag(json, inside, "uniform", false);
+    if (kinds != 1)
+        throw Error(Fault::bad_input,
+                    inside + ": give 'levels', 'bounds_m', 'triangles' or 'uniform'");
+    if (json.contains("levels")) {
+        const double n = json_number(json, inside, "levels", 1, kMostLevels),
+                     bound_m = json_number(json, inside, "bound_m", 1e-9, 1e6),
+                     factor = json_number(json, inside, "factor", 1.01, 100);
+        for (int j = 0; j < static_cast<int>(n); ++j)
+            lod.bounds_m.push_back(scale * bound_m * std::pow(factor, j));
+    } else if (json.contains("bounds_m")) {
+        lod.bounds_m = level_list<double>(json, inside, "bounds_m", 1e-9, 1e6, true);
+        for (double& bound_m : lod.bounds_m)
+            bound_m *= scale;
+    } else if (json.contains("triangles")) {
+        lod.triangles = level_list<std::uint64_t>(json, inside, "triangles", 4, 1e9, false);
+    }
+    lod.openness = json_flag(json, inside, "openness", true);
+    if (json.contains("origin")) {
+        const std::string origin = json_text(json, inside, "origin");
+        if (origin != "foot" && origin != "world")
+            throw Error(Fault::bad_input, inside + ": 'origin' must be foot or world");
+        lod.at_foot = origin == "foot";
+    }
+    return lod;
 }
 
 /// The box of the solid before it is scaled.

@@ -37,6 +37,7 @@ struct GlbSettings {
     std::string recipe{};      ///< JSON text kept in asset.extras.taihu_recipe, or empty
     double roughness = 0.9;    ///< of the one material, 0..1
     double grey = 0.56;        ///< base colour, linear, 0..1
+    Vec3 shift{};              ///< added to all positions, by the nodes [m]
 };
 
 /// A GLB of Draco levels, finest first: KHR_draco_mesh_compression (required), openness as COLOR_0,
@@ -44,5 +45,8 @@ struct GlbSettings {
 /// node and MSFT_screencoverage in its extras. Accessor counts, minima and maxima are those of the
 /// decoded arrays. The same input gives the same bytes.
 std::string format_glb(std::span<const EncodedLevel> levels, const GlbSettings& settings = {});
+
+/// What brings the middle of the foot of a box to the origin, within 1/4096 of its longest side.
+Vec3 foot_shift(const Box& box);
 
 } // namespace taihu

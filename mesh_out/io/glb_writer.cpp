@@ -187,6 +187,13 @@ std::string format_plain_glb(const TriMesh& mesh, const std::string& recipe) {
     return glb.bytes();
 }
 
+Vec3 foot_shift(const Box& box) {
+    // A power of two, so that positions stay on their grids.
+    const double step = std::exp2(std::floor(std::log2(box.longest() / 4096)));
+    const auto rounded = [&](double v) { return std::round(v / step) * step; };
+    return {-rounded(box.center().x), -rounded(box.lo.y), -rounded(box.center().z)};
+}
+
 std::string format_glb(std::span<const EncodedLevel> levels, const GlbSettings& settings) {
     check_levels(levels, settings);
     Assembly glb(settings.recipe);
@@ -204,7 +211,10 @@ std::string format_glb(std::span<const EncodedLevel> levels, const GlbSettings& 
             i == 0 ? settings.name : settings.name + "_lod" + std::to_string(i);
         glb.json["meshes"].push_back(
             {{"name", name}, {"primitives", Json::array({draco_primitive(glb, levels[i])})}});
-        glb.json["nodes"].push_back({{"name", name}, {"mesh", i}});
+        Json node = {{"name", name}, {"mesh", i}};
+        if (const Vec3& s = settings.shift; s != Vec3{})
+            node["translation"] = {s.x, s.y, s.z};
+        glb.json["nodes"].push_back(std::move(node));
         coverages.push_back(levels[i].screen_coverage);
         if (i > 0)
             lower.push_back(i);

@@ -1,0 +1,132 @@
+#include "mesh_out/field_distance.h"
+
+#include <algorithm>
+#include <cmath>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include <tbb/blocked_range.h>
+#include <tbb/parallel_for.h>
+
+#include "mesh_out/surface_distance.h"
+#include "stats/core/error.h"
+
+namespace taihu {
+namespace {
+
+constexpr double kOn = 1e-3;        ///< of the spacing: on the surface
+constexpr double kFarthest = 8;     ///< spacings that a projection may take
+constexpr std::size_t kChunk = 512; ///< faces or points that are summed together
+constexpr int kFinest = 64;         ///< parts of an edge
+
+/// The nearest point of the surface that can be reached by projecting onto the primitive that
+/// decides at `p`, then onto all that turn out to decide where that leads.
+std::optional<double> reached(const FieldProbe& field, const Vec3& p, double spacing_m) {
+    const auto here = field.at(p);
+    PrimitiveSet set(here.primitive);
+    for (std::size_t i = 0; i < PrimitiveSet::kMost; ++i) {
+        const auto q = onto(field, set, p, std::fabs(here.value_m) + kFarthest * spacing_m);
+        if (!q)
+            return std::nullopt;
+        const auto there = field.at(*q);
+        if (std::fabs(there.value_m) < kOn * spacing_m)
+            return length(*q - p);
+        if (!set.add(there.primitive))
+            return std::nullopt;
+    }
+    return std::nullopt;
+}
+
+struct Sum {
+    double most = 0, apart = 0, squares = 0;
+    Vec3 worst;
+    std::size_t n = 0;
+
+    void add(const Vec3& p, double d, std::span<const Sphere> balls) {
+        const bool is_apart = std::any_of(balls.begin(), balls.end(), [&](const Sphere& b) {
+            return length(p - b.center) <= b.radius_m;
+        });
+        ++n;
+        squares += d * d;
+        if (is_apart) {
+            apart = std::max(apart, d);
+        } else if (d > most) {
+            most = d;
+            worst = p;
+        }
+    }
+    void add(const Sum& other) {
+        n += other.n;
+        squares += other.squares;
+        apart = std::max(apart, other.apart);
+        if (other.most > most) {
+            most = other.most;
+            worst = other.worst;
+        }
+    }
+    double rms() const { return n > 0 ? std::sqrt(squares / static_cast<double>(n)) : 0; }
+};
+
+/// one(i, sum) for i in 0..n, in chunks of one size, added up in order.
+template <class One>
+Sum summed(std::size_t n, Progress* progress, One&& one) {
+    std::vector<Sum> chunks((n + kChunk - 1) / kChunk);
+    tbb::parallel_for(std::size_t{0}, chunks.size(), [&](std::size_t c) {
+        check_cancelled(progress);
+        for (std::size_t i = c * kChunk; i < std::min(n, (c + 1) * kChunk); ++i)
+            one(i, chunks[c]);
+    });
+    Sum all;
+    for (const Sum& c : chunks)
+        all.add(c);
+    return all;
+}
+
+/// fn(p) on the corners of a face and between them, no two neighbours farther apart than the
+/// spacing.
+template <class Fn>
+void each_sample(const TriMesh& mesh, std::size_t face, double spacing_m, Fn&& fn) {
+    const Triangle& t = mesh.triangles[face];
+    const Vec3 &a = mesh.positions[t[0]], &b = mesh.positions[t[1]], &c = mesh.positions[t[2]];
+    const double edge = std::max({length(b - a), length(c - b), length(a - c)});
+    const int n = static_cast<int>(std::clamp(std::ceil(edge / spacing_m), 2.0, double{kFinest}));
+    for (int u = 0; u <= n; ++u)
+        for (int v = 0; u + v <= n; ++v) {
+            const double x = double(u) / n, y = double(v) / n;
+            fn(a * (1 - x - y) + b * x + c * y);
+        }
+}
+
+} // namespace
+
+FieldDistance field_distance(const TriMesh& mesh, const FieldProbe& field, const TriMesh& surface,
+                             double spacing_m, std::span<const Sphere> apart, Progress* progress) {
+    if (mesh.triangles.empty() || surface.triangles.empty())
+        throw Error(Fault::bad_argument, "field distance: a mesh is empty; give one with faces");
+    if (!(spacing_m >= 1e-5 * bounds(mesh).longest()))
+        throw Error(Fault::bad_argument, "field distance: spacing_m is " +
+                                             std::to_string(spacing_m) +
+                                             ", must be at least 1e-5 of the mesh");
+    const SurfaceDistance to_surface(surface), to_mesh(mesh);
+    const Sum there = summed(mesh.triangles.size(), progress, [&](std::size_t f, Sum& sum) {
+        each_sample(mesh, f, spacing_m, [&](const Vec3& p) {
+            const auto d = reached(field, p, spacing_m);
+            sum.add(p, d ? *d : to_surface(p), apart);
+        });
+    });
+    const Sum back = summed(surface.positions.size(), progress, [&](std::size_t i, Sum& sum) {
+        sum.add(surface.positions[i], to_mesh(surface.positions[i]), apart);
+    });
+    FieldDistance result;
+    result.max_to_field_m = there.most;
+    result.max_from_field_m = back.most;
+    result.max_m = std::max(there.most, back.most);
+    result.worst = there.most >= back.most ? there.worst : back.worst;
+    result.rms_m = std::max(there.rms(), back.rms());
+    result.max_apart_m = std::max(there.apart, back.apart);
+    result.n_samples = there.n + back.n;
+    return result;
+}
+
+} // namespace taihu
