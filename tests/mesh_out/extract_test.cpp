@@ -8,6 +8,9 @@
 #include "mesh_out/certificate.h"
 #include "stats/core/error.h"
 #include "tests/support/level_sets.h"
+#include "vdb_ops/clean.h"
+#include "vdb_ops/rasterize.h"
+#include "vdb_ops/shapes.h"
 
 namespace taihu {
 namespace {
@@ -34,6 +37,23 @@ TEST(Extract, GivesABallItsVolumeAndPlace) {
     EXPECT_NEAR(signed_volume_m3(mesh), ball_m3, 0.003 * ball_m3);
     for (const Vec3& p : mesh.positions)
         EXPECT_NEAR(length(p), 1, 0.05 * 0.05); // voxel^2 / radius
+}
+
+TEST(Extract, MakesASolidOfAFractalRockThatCrossesItself) {
+    const ShapeSettings settings{
+        .kind = ShapeKind::fractal_rock,
+        .fractal = {.base = 0, .iterations = 2, .along = DisplaceAlong::normal, .amplitude = 0.8}};
+    const TriMesh rock = shape_mesh(settings);
+    const Certificate crossed = certify(rock);
+    EXPECT_TRUE(crossed.holds());
+    EXPECT_GT(crossed.n_self_intersections, 100u);
+    const auto solid = rasterize(*shape_field(settings), {0.02, {}, 3});
+    const Certificate c = certify(extract_uniform(*clean(*solid).solid));
+    EXPECT_TRUE(c.holds());
+    EXPECT_EQ(c.n_components, 1u);
+    EXPECT_LT(c.n_self_intersections, crossed.n_self_intersections / 20);
+    // Folds count twice in the mesh, or not at all where they are inside out.
+    EXPECT_NEAR(c.volume_m3, crossed.volume_m3, 0.1 * crossed.volume_m3);
 }
 
 TEST(Extract, IsCertifiedWithHolesThatCutEachOther) {
