@@ -5,7 +5,10 @@
 #include <numeric>
 #include <string>
 
+#include "mesh_out/texture_coordinates.h"
 #include "stats/core/error.h"
+#include "stats/core/portable_math.h"
+#include "stats/core/rng.h"
 #include "stats/number_detail.h"
 
 namespace taihu {
@@ -146,6 +149,70 @@ Image bump_normals(const Image& offsets, double scale) {
         out.pixels[3 * i + 2] = static_cast<float>(1 / length);
     }
     return out;
+}
+
+Image static_bump_map(int side, double hurst, std::uint64_t seed) {
+    constexpr std::uint32_t kStream = 0x62756d70; // "bump"
+    constexpr int kCells = 8;
+    if (side < 16 || side > 8192 || !(hurst >= 0.05 && hurst <= 2))
+        throw Error(Fault::bad_argument, "bump: a map of side " + std::to_string(side) +
+                                             " and hurst " + shortest(hurst) +
+                                             "; take a side in 16..8192, hurst in 0.05..2");
+    Image out(side, side, 1);
+    double amplitude = 1, sum = 0;
+    std::uint32_t octave = 0;
+    for (int cells = kCells; 2 * cells <= side; cells *= 2, ++octave) {
+        const auto at = [&](int x, int y) {
+            const auto item =
+                static_cast<std::uint64_t>(y % cells) << 32 | static_cast<std::uint64_t>(x % cells);
+            return 2 * Rng{seed, kStream}.uniform(item, octave) - 1;
+        };
+        const auto ease = [](double t) { return t * t * (3 - 2 * t); };
+        for (int y = 0; y < side; ++y)
+            for (int x = 0; x < side; ++x) {
+                const double u = static_cast<double>(x) * cells / side,
+                             v = static_cast<double>(y) * cells / side;
+                const int i = static_cast<int>(u), j = static_cast<int>(v);
+                const double s = ease(u - i), t = ease(v - j);
+                const double low = at(i, j) + s * (at(i + 1, j) - at(i, j));
+                const double high = at(i, j + 1) + s * (at(i + 1, j + 1) - at(i, j + 1));
+                *out.at(x, y) += static_cast<float>(amplitude * (low + t * (high - low)));
+            }
+        sum += amplitude;
+        amplitude *= portable_exp(-hurst * portable_log(2));
+    }
+    for (float& v : out.pixels)
+        v = static_cast<float>(v / sum);
+    return out;
+}
+
+std::vector<Vec3> bumped_normals(const TriMesh& mesh, const Image& offsets, const Box& of,
+                                 double scale, int repeats) {
+    check(offsets, 2, "offsets");
+    if (mesh.normals.size() != mesh.positions.size() || repeats < 1 || !std::isfinite(scale))
+        throw Error(Fault::bad_argument,
+                    "bump: need a mesh with normals, a finite scale and a repeat at least; has " +
+                        std::to_string(mesh.normals.size()) + " normals, scale " + shortest(scale) +
+                        ", " + std::to_string(repeats) + " repeats");
+    const auto at = texture_coordinates(mesh, TextureMap::spherical, of);
+    const Vec3 middle = of.center();
+    std::vector<Vec3> normals = mesh.normals;
+    const auto texel = [](double share, int n) {
+        return std::min(static_cast<int>((share - std::floor(share)) * n), n - 1);
+    };
+    for (std::size_t i = 0; i < mesh.triangles.size(); ++i)
+        for (std::size_t k = 0; k < 3; ++k) {
+            const std::uint32_t vertex = mesh.triangles[i][k];
+            const Vec3 out = mesh.positions[vertex] - middle, &n = mesh.normals[vertex];
+            const Vec3 east = normalized({out.z, 0, -out.x});
+            const Vec3 along_u = normalized(east - n * dot(east, n)), along_v = cross(n, along_u);
+            const float* lean =
+                offsets.at(texel(at.corners[i][k].u * repeats, offsets.width),
+                           texel((1 - at.corners[i][k].v) * repeats, offsets.height));
+            normals[vertex] =
+                normalized(n - along_u * (scale * lean[0]) - along_v * (scale * lean[1]));
+        }
+    return normals;
 }
 
 } // namespace taihu

@@ -1,5 +1,10 @@
 #pragma once
+#include <cstdint>
+#include <vector>
+
+#include "stats/core/box.h"
 #include "stats/core/image.h"
+#include "stats/core/tri_mesh.h"
 
 namespace taihu {
 
@@ -28,5 +33,21 @@ Image bump_heights(const Image& offsets, MapBorder border);
 /// normalised. \param scale  texels per unit of height.
 /// \throws as bump_offsets(); a scale that is not finite.
 Image bump_normals(const Image& offsets, double scale);
+
+/// Heights of a static bump map, 1 channel of side x side texels, that looks like rock on any model
+/// and repeats without a seam: value noise of 8 cells to a side and of octaves of half the size
+/// down to two texels, each 2^-hurst of the one before; within -1..1. The same on every platform.
+/// \param side  16..8192. \param hurst  0.05..2.
+/// \throws Error bad_argument: one out of range.
+/// Source: Deix, "Real-time rendering of fractal rocks", section 7, way (1); the noise is ours.
+Image static_bump_map(int side, double hurst, std::uint64_t seed);
+
+/// The mesh's normals as a bump map has them, laid around the frame `of` by longitude and latitude
+/// (TextureMap::spherical) `repeats` times: n - scale (u-offset along the parallel, v-offset along
+/// the meridian), normalised. Positions stay. A vertex on the axis keeps its normal.
+/// \param scale  texels per unit of height, as in bump_normals(). \param repeats  >= 1.
+/// \throws as bump_offsets() and texture_coordinates(); bad_argument: a mesh without normals.
+std::vector<Vec3> bumped_normals(const TriMesh& mesh, const Image& offsets, const Box& of,
+                                 double scale, int repeats);
 
 } // namespace taihu

@@ -14,7 +14,7 @@ namespace taihu {
 namespace {
 
 struct ShapeArgs {
-    std::string kind, size = "1m", tube, round, voxel, damping, along;
+    std::string kind, size = "1m", tube, round, voxel, damping, along, bump;
     std::filesystem::path out, stages;
     ShapeSettings settings;
     CaveSettings cave;
@@ -38,6 +38,7 @@ void refuse_unused(std::optional<ShapeKind> kind, const CLI::App& verb) {
                                                  {"--room", cave},
                                                  {"--wall", cave},
                                                  {"--stages", fractal && !cave},
+                                                 {"--bump", fractal && !cave},
                                                  {"--base", fractal},
                                                  {"--iterations", fractal},
                                                  {"--damping", fractal},
@@ -155,7 +156,9 @@ void run(ShapeArgs& args, const CLI::App& verb, const Console& console) {
     }
     const TriMesh mesh = shape_mesh(args.settings); // refuses settings out of range
     if (!args.stages.empty())
-        write_stages(args.settings, args.stages, console);
+        write_stages(args.settings,
+                     args.bump == "static" ? StageBump::static_map : StageBump::dynamic,
+                     args.stages, console);
     const Box box = shape_box(args.settings);
     check_solid_path(args.out);
     console.may_write(args.out);
@@ -240,6 +243,11 @@ void add_shape(CLI::App& app, Console& console) {
     verb->add_option("--stages", args->stages,
                      "fractal_rock: a folder for the nine steps to it, meshes and pictures; with "
                      "--base 0 those of the paper");
+    verb->add_option("--bump", args->bump,
+                     "with --stages: normals of the last from the finer model (dynamic), or from a "
+                     "static bump map [dynamic]")
+        ->check(CLI::IsMember({"dynamic", "static"}))
+        ->needs("--stages");
     verb->add_option("--rocks", args->cave.n_rocks, "cave: fractal rocks taken from a box, 1..200")
         ->check(CLI::Range(1, 200))
         ->capture_default_str();

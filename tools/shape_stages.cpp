@@ -3,6 +3,7 @@
 #include <array>
 #include <cmath>
 
+#include "mesh_out/bump.h"
 #include "mesh_out/certificate.h"
 #include "mesh_out/io/image_file.h"
 #include "mesh_out/io/mesh_file.h"
@@ -49,7 +50,15 @@ struct Stage {
     bool lit = false, textured = false;
 };
 
-std::array<Stage, 9> stages_of(const ShapeSettings& s) {
+/// The normals of a static bump map on those of the mesh.
+std::vector<Vec3> statically_bumped(const TriMesh& mesh, std::uint64_t seed) {
+    constexpr int kSide = 512, kRepeats = 2;
+    const Image offsets = bump_offsets(static_bump_map(kSide, 0.8, seed), MapBorder::wrap);
+    constexpr double kHeight_m = 0.03; // of a rock 1 m wide: 3 m around
+    return bumped_normals(mesh, offsets, bounds(mesh), kHeight_m * kSide * kRepeats / 3, kRepeats);
+}
+
+std::array<Stage, 9> stages_of(const ShapeSettings& s, StageBump bump) {
     const TriMesh base = fractal_base(s.fractal, s.seed);
     const FractalRefiner refiner(base, s.fractal, s.seed);
     const MidpointMesh displaced = refiner.displace(refiner.start(base));
@@ -63,8 +72,18 @@ std::array<Stage, 9> stages_of(const ShapeSettings& s) {
     // The same faces cut in 16 flat ones have a vertex for each of the finer model.
     FractalSettings flat = s.fractal;
     flat.amplitude = flat.roundness = 0;
-    TriMesh bumped = FractalRefiner(rescaled, flat, s.seed).iterate(rescaled, 1);
-    bumped.normals = averaged_normals(fitted(refiner.iterate(twice, 1), s.size_m));
+    const auto cut = [&](const TriMesh& mesh) {
+        return FractalRefiner(mesh, flat, s.seed).iterate(mesh, 1);
+    };
+    TriMesh bumped = cut(rescaled);
+    if (bump == StageBump::dynamic) {
+        bumped.normals = averaged_normals(fitted(refiner.iterate(twice, 1), s.size_m));
+    } else {
+        bumped.normals = cut({lit.normals, lit.triangles, {}}).positions; // halves between them
+        for (Vec3& n : bumped.normals)
+            n = normalized(n);
+        bumped.normals = statically_bumped(bumped, s.seed);
+    }
     return {{{"1-base", base},
              {"2-displaced", displaced.mesh},
              {"3-damped", damped},
@@ -78,8 +97,8 @@ std::array<Stage, 9> stages_of(const ShapeSettings& s) {
 
 } // namespace
 
-void write_stages(const ShapeSettings& settings, const std::filesystem::path& folder,
-                  const Console& console) {
+void write_stages(const ShapeSettings& settings, StageBump bump,
+                  const std::filesystem::path& folder, const Console& console) {
     if (settings.kind != ShapeKind::fractal_rock ||
         settings.fractal.damping != Damping::interpolating)
         throw Error(Fault::bad_argument, "--stages: are those of a fractal_rock with "
@@ -90,7 +109,7 @@ void write_stages(const ShapeSettings& settings, const std::filesystem::path& fo
         throw Error(Fault::io, folder.string() + ": " + failed.message() + "; choose another");
     report_stage(console.progress, "stages");
     const Rng rng{settings.seed, kGrainStream};
-    for (const Stage& stage : stages_of(settings)) {
+    for (const Stage& stage : stages_of(settings, bump)) {
         const std::filesystem::path mesh = folder / (std::string(stage.name) + ".glb"),
                                     picture = folder / (std::string(stage.name) + ".png");
         console.may_write(mesh);

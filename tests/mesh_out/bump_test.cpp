@@ -5,6 +5,7 @@
 
 #include "stats/core/rng.h"
 #include "tests/support/errors.h"
+#include "vdb_ops/icosphere.h"
 
 namespace taihu {
 namespace {
@@ -74,6 +75,49 @@ TEST(SeedRow, D12OffsetsOfAHeightFieldSurviveTheRoundTrip) {
     }
 }
 
+TEST(SeedRow, D11AStaticBumpMapFakesTheSurfaceOfAnyModel) {
+    const Image heights = static_bump_map(128, 0.7, 4);
+    EXPECT_EQ(heights.pixels, static_bump_map(128, 0.7, 4).pixels);
+    EXPECT_NE(heights.pixels, static_bump_map(128, 0.7, 5).pixels);
+    const Image offsets = bump_offsets(heights, MapBorder::wrap);
+    // No seam: steps across the border are like those inside.
+    double inside = 0, across = 0;
+    for (int y = 0; y < 128; ++y) {
+        for (int x = 0; x < 127; ++x)
+            inside += std::fabs(offsets.at(x, y)[0]) / 127;
+        across += std::fabs(offsets.at(127, y)[0]);
+    }
+    EXPECT_NEAR(across / inside, 1, 0.5); // of 128 steps that hang together over two or more
+
+    TriMesh ball = icosphere(5);
+    ball.normals = ball.positions;
+    const Box frame = bounds(ball);
+    const std::vector<Vec3> bumped = bumped_normals(ball, offsets, frame, 10, 2);
+    double lean = 0;
+    for (std::size_t i = 0; i < bumped.size(); ++i) {
+        EXPECT_NEAR(length(bumped[i]), 1, 1e-12);
+        lean += std::acos(std::min(1.0, dot(bumped[i], ball.normals[i]))) / bumped.size();
+    }
+    EXPECT_GT(lean, 0.05); // rad
+    for (const auto& flat : {bumped_normals(ball, offsets, frame, 0, 2),
+                             bumped_normals(ball, Image(4, 4, 2), frame, 10, 1)})
+        for (std::size_t i = 0; i < flat.size(); ++i)
+            EXPECT_LT(length(flat[i] - ball.normals[i]), 1e-12);
+}
+
+TEST(Bump, NormalsLeanAwayFromWhereTheMapRises) {
+    // Heights that rise to the right and upwards: normals lean to the left and down.
+    Image offsets(1, 1, 2);
+    offsets.pixels = {0.5f, 0.25f};
+    TriMesh front;
+    front.positions = {{-0.1, -0.1, 1}, {0.1, -0.1, 1}, {0, 0.1, 1}};
+    front.triangles = {{0, 1, 2}};
+    front.normals.assign(3, {0, 0, 1});
+    const Vec3 expected = normalized({-0.5, -0.25, 1});
+    const Vec3 n = bumped_normals(front, offsets, {{-1, -1, -1}, {1, 1, 1}}, 1, 1)[2];
+    EXPECT_LT(length(n - expected), 1e-12);
+}
+
 TEST(Bump, OffsetsOfNoHeightFieldGetTheNearestOne) {
     for (const MapBorder border : {MapBorder::open, MapBorder::wrap}) {
         const Image offsets = random_image(24, 20, 2, 5);
@@ -115,6 +159,11 @@ TEST(Bump, RefusesOtherMaps) {
     hole.pixels[3] = std::nanf("");
     expect_error(Fault::bad_argument, "value 3 is not finite",
                  [&] { bump_heights(hole, MapBorder::wrap); });
+    expect_error(Fault::bad_argument, "side in 16..8192", [] { static_bump_map(4, 0.5, 0); });
+    expect_error(Fault::bad_argument, "hurst 3", [] { static_bump_map(16, 3, 0); });
+    expect_error(Fault::bad_argument, "has 0 normals", [] {
+        bumped_normals(icosphere(0), Image(1, 1, 2), {{-1, -1, -1}, {1, 1, 1}}, 1, 1);
+    });
     expect_error(Fault::bad_argument, "scale", [] { bump_normals(Image(1, 1, 2), std::nan("")); });
 }
 

@@ -96,6 +96,11 @@ TEST(SeedRow, D17TheNineStagesAreWritten) {
         pictures.insert(read_file(scratch / ("st/" + std::string(name) + ".png")));
     }
     EXPECT_EQ(pictures.size(), 9u);
+    const std::string dynamic = read_file(scratch / "st/9-bump-mapped.glb");
+    result(
+        "taihu shape fractal-rock --base 0 --size 1,0.7,0.9 --stages st --bump static -o rock.ply",
+        scratch); // D11
+    EXPECT_NE(read_file(scratch / "st/9-bump-mapped.glb"), dynamic);
 }
 
 TEST(Verbs, AFractalRockIsABaseForCarving) {

@@ -11,7 +11,10 @@
 #include "stats/core/sha256.h"
 #include "tests/support/cube_mesh.h"
 #include "tests/support/errors.h"
+#include "tests/support/grids.h"
 #include "vdb_ops/icosphere.h"
+#include "vdb_ops/recipe.h"
+#include "vdb_ops/recipe_solid.h"
 #include "vdb_ops/shapes.h"
 
 namespace taihu {
@@ -326,6 +329,35 @@ TEST(FractalRock, NoDisplacementAndFullRoundnessGiveASphere) {
         {.base = 0, .iterations = 5, .damping = Damping::none, .amplitude = 0, .roundness = 1}, 0);
     for (const Vec3& p : ball.positions)
         EXPECT_NEAR(length(p), 1, 1e-14);
+}
+
+TEST(FractalRock, IsANodeOfRecipes) {
+    const ShapeSettings settings{.kind = ShapeKind::fractal_rock,
+                                 .size_m = {1, 0.8, 0.9},
+                                 .fractal = {.base = 0,
+                                             .iterations = 2,
+                                             .damping = Damping::approximating,
+                                             .along = DisplaceAlong::normal,
+                                             .amplitude = 0.2,
+                                             .hurst_up = 0.6,
+                                             .hurst_down = 1.1,
+                                             .corners = 0.3,
+                                             .roundness = 0.7},
+                                 .seed = 11};
+    const auto made = make_recipe(format_recipe(shape_node(settings), 0.04, 0), "r.json", {});
+    EXPECT_EQ(grid_hash(*made.solid), grid_hash(*rasterize(*shape_field(settings), {0.04, {}, 3})));
+    const auto refused = [](const std::string& body) {
+        return [body] {
+            make_recipe(R"({"taihu_recipe":1,"solid":{"fractal_rock":{"size_m":[1,1,1],)" + body +
+                            "}}}",
+                        "r.json", {});
+        };
+    };
+    expect_error(Fault::bad_input, "'damping' is 'soft'; must be one of none, interpolating",
+                 refused(R"("damping":"soft")"));
+    expect_error(Fault::bad_input, "'hurst' is [3,1]", refused(R"("hurst":[3,1])"));
+    expect_error(Fault::bad_input, "'iterations'", refused(R"("iterations":9)"));
+    expect_error(Fault::bad_input, "did you mean 'amplitude'?", refused(R"("amplitud":1)"));
 }
 
 TEST(FractalRock, RefusesSettingsAndMeshesByName) {
