@@ -74,6 +74,17 @@ std::string shape_node(const ShapeSettings& s) {
         body["lumps"] = s.lumps;
         body["seed"] = s.seed;
     }
+    if (s.kind == ShapeKind::fractal_rock) {
+        body["base"] = s.fractal.base;
+        body["iterations"] = s.fractal.iterations;
+        body["damping"] = damping_name(s.fractal.damping);
+        body["along"] = along_name(s.fractal.along);
+        body["amplitude"] = s.fractal.amplitude;
+        body["hurst"] = {s.fractal.hurst_up, s.fractal.hurst_down};
+        body["corners"] = s.fractal.corners;
+        body["roundness"] = s.fractal.roundness;
+        body["seed"] = s.seed;
+    }
     return node(std::string(shape_name(s.kind)).c_str(), std::move(body));
 }
 

@@ -150,10 +150,27 @@ std::filesystem::path asset(const Keys& keys, const char* key, const RecipeParse
                                "' beside the recipe; put it there, or name its folder (--assets)");
 }
 
+FractalSettings fractal_of(const Keys& keys) {
+    FractalSettings f;
+    if (keys.has("base"))
+        f.base = static_cast<int>(keys.whole("base", 5));
+    if (keys.has("iterations"))
+        f.iterations = static_cast<int>(keys.whole("iterations", 8));
+    f.damping = damping_from_name(keys.word("damping", damping_name(f.damping).data(), "none",
+                                            "interpolating", "approximating"));
+    f.along = along_from_name(keys.word("along", along_name(f.along).data(), "radius", "normal"));
+    f.amplitude = keys.number_or("amplitude", f.amplitude, 0, 1);
+    if (keys.has("hurst"))
+        std::tie(f.hurst_up, f.hurst_down) = keys.pair("hurst", 0.05, 2);
+    f.corners = keys.number_or("corners", f.corners, 0, 1);
+    f.roundness = keys.number_or("roundness", f.roundness, 0, 1);
+    return f;
+}
+
 Node parse_shape(ShapeKind kind, const json& body, const std::string& where, RecipeParser& parser) {
     ShapeSettings s;
     s.kind = kind;
-    const bool boulder = kind == ShapeKind::boulder;
+    const bool seeded = kind == ShapeKind::boulder || kind == ShapeKind::fractal_rock;
     const Keys keys = [&]() -> Keys {
         switch (kind) {
         case ShapeKind::torus:
@@ -162,6 +179,12 @@ Node parse_shape(ShapeKind kind, const json& body, const std::string& where, Rec
             return {body, where, {"size_m"}, {"subdivisions"}};
         case ShapeKind::boulder:
             return {body, where, {"size_m"}, {"subdivisions", "relief", "lumps", "seed"}};
+        case ShapeKind::fractal_rock:
+            return {body,
+                    where,
+                    {"size_m"},
+                    {"base", "iterations", "damping", "along", "amplitude", "hurst", "corners",
+                     "roundness", "seed"}};
         case ShapeKind::rounded_box:
             return {body, where, {"size_m"}, {"round_m"}};
         case ShapeKind::superquadric:
@@ -180,7 +203,9 @@ Node parse_shape(ShapeKind kind, const json& body, const std::string& where, Rec
         s.subdivisions = static_cast<int>(keys.whole("subdivisions", 8));
     s.relief = keys.number_or("relief", s.relief, 0, 0.9);
     s.lumps = keys.number_or("lumps", s.lumps, 0.1, 16);
-    if (boulder)
+    if (kind == ShapeKind::fractal_rock)
+        s.fractal = fractal_of(keys);
+    if (seeded)
         s.seed = seed_of(keys, parser);
     return make_shape_node(s);
 }
@@ -418,7 +443,7 @@ std::unique_ptr<RecipeNode> parse_node(const json& node, const std::string& wher
     std::vector<std::string_view> known;
     for (const auto& [name, parse] : kNodes)
         known.push_back(name);
-    for (int i = 0; i <= static_cast<int>(ShapeKind::boulder); ++i) {
+    for (int i = 0; i <= static_cast<int>(ShapeKind::fractal_rock); ++i) {
         const auto shape = static_cast<ShapeKind>(i);
         if (shape_name(shape) == kind)
             return parse_shape(shape, body, inside, parser);
