@@ -88,11 +88,15 @@ std::string shape_node(const ShapeSettings& s) {
     return node(std::string(shape_name(s.kind)).c_str(), std::move(body));
 }
 
-std::string mesh_node(const std::string& name, const std::string& sha256, double unit_m,
-                      bool z_up) {
+std::string mesh_node(const std::string& name, const std::string& sha256, double unit_m, bool z_up,
+                      const CloseSettings& close) {
     Json body = {{"file", name}, {"sha256", sha256}, {"unit_m", unit_m}};
     if (z_up)
         body["up"] = "z";
+    if (close.rule != CloseRule::loops)
+        body["close"] = close_rule_name(close.rule);
+    if (close.shells != ShellRule::unite)
+        body["shells"] = shell_rule_name(close.shells);
     return node("mesh", std::move(body));
 }
 

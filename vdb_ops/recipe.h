@@ -4,6 +4,7 @@
 #include <string>
 
 #include "stats/io/measurements.h"
+#include "vdb_ops/mesh_diagnosis.h"
 #include "vdb_ops/place.h"
 #include "vdb_ops/shapes.h"
 
@@ -15,8 +16,10 @@ namespace taihu {
 /// text.
 
 std::string shape_node(const ShapeSettings& shape);
-/// A mesh file: its base name and hash, its unit of length, and whether its Z axis points up.
-std::string mesh_node(const std::string& name, const std::string& sha256, double unit_m, bool z_up);
+/// A mesh file: its base name and hash, its unit of length, whether its Z axis points up, and how
+/// it is closed (keys for what is not by default).
+std::string mesh_node(const std::string& name, const std::string& sha256, double unit_m, bool z_up,
+                      const CloseSettings& close = {});
 /// A level set that carries no recipe of its own.
 std::string level_set_node(const std::string& name, const std::string& sha256);
 /// Holes from a table.

@@ -11,7 +11,7 @@
 #include "vdb_ops/combine_field.h"
 #include "vdb_ops/level_set_box.h"
 #include "vdb_ops/level_set_field.h"
-#include "vdb_ops/mesh_field.h"
+#include "vdb_ops/mesh_solid.h"
 #include "vdb_ops/offset_field.h"
 #include "vdb_ops/place.h"
 #include "vdb_ops/placed_level_set_field.h"
@@ -83,21 +83,22 @@ private:
 
 class MeshNode final : public RecipeNode {
 public:
-    MeshNode(TriMesh mesh, std::string where, CloseRule close)
+    MeshNode(TriMesh mesh, std::string where, const CloseSettings& close)
         : mesh_(std::move(mesh)), where_(std::move(where)), close_(close) {}
     Box box(const Similarity& at) const override { return placed(bounds(mesh_), at); }
     std::shared_ptr<const Field> field(const RecipeScene& scene,
                                        const Similarity& at) const override {
-        ClosedMesh closed = close_mesh(placed(mesh_, at), where_, close_, scene.progress);
-        for (const std::string& line : closed.diagnosis.lines())
+        const MeshSolid solid =
+            mesh_solid(placed(mesh_, at), where_, close_, scene.lattice, scene.progress);
+        for (const std::string& line : solid.diagnosis.lines(scene.lattice.voxel_m))
             scene.found.push_back(where_ + ": " + line);
-        return std::make_shared<MeshField>(std::move(closed));
+        return solid.field;
     }
 
 private:
     TriMesh mesh_;
     std::string where_;
-    CloseRule close_;
+    CloseSettings close_;
 };
 
 class LevelSetNode final : public RecipeNode {
@@ -396,7 +397,7 @@ Node make_plane_node(const Similarity& at) {
     return std::make_unique<PlaneNode>(at);
 }
 
-Node make_mesh_node(TriMesh mesh, std::string where, CloseRule close) {
+Node make_mesh_node(TriMesh mesh, std::string where, const CloseSettings& close) {
     return std::make_unique<MeshNode>(std::move(mesh), std::move(where), close);
 }
 

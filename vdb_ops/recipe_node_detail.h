@@ -12,9 +12,9 @@
 #include "stats/core/tri_mesh.h"
 #include "stats/law.h"
 #include "vdb_ops/clean.h"
-#include "vdb_ops/closed_mesh.h"
 #include "vdb_ops/combine_field.h"
 #include "vdb_ops/field.h"
+#include "vdb_ops/mesh_diagnosis.h"
 #include "vdb_ops/place.h"
 #include "vdb_ops/shapes.h"
 #include "vdb_ops/similarity.h"
@@ -49,7 +49,8 @@ public:
 std::unique_ptr<RecipeNode> make_shape_node(const ShapeSettings& shape);
 /// What lies below y = 0, put at `at`.
 std::unique_ptr<RecipeNode> make_plane_node(const Similarity& at);
-std::unique_ptr<RecipeNode> make_mesh_node(TriMesh mesh, std::string where, CloseRule close);
+std::unique_ptr<RecipeNode> make_mesh_node(TriMesh mesh, std::string where,
+                                           const CloseSettings& close);
 std::unique_ptr<RecipeNode> make_level_set_node(openvdb::FloatGrid::Ptr grid);
 std::unique_ptr<RecipeNode> make_holes_node(std::vector<Sphere> spheres);
 /// \param box  where they are placed; nothing: in the solid that stands before them in a

@@ -228,15 +228,19 @@ Node parse_plane(const json& body, const std::string& where, RecipeParser&) {
 }
 
 Node parse_mesh(const json& body, const std::string& where, RecipeParser& parser) {
-    const Keys keys(body, where, {"file", "sha256"}, {"unit_m", "up", "close"});
+    const Keys keys(body, where, {"file", "sha256"}, {"unit_m", "up", "close", "shells"});
     const auto path = asset(keys, "file", parser);
     const double unit_m = keys.number_or("unit_m", 1, 1e-9, 1e9);
     const bool z_up = keys.word("up", "y", "y", "z") == "z";
-    const bool open = keys.word("close", "loops", "loops", "none") == "none";
+    const std::string rule = keys.word("close", "loops", "loops", "winding", "plane", "none");
+    const std::string shells = keys.word("shells", "union", "union", "parity");
+    if (rule == "winding" && keys.has("shells"))
+        refuse(where, "'shells' is for shells taken one by one, and 'close' \"winding\" takes them "
+                      "all at once; drop one of them");
     if (!parser.assets.read_mesh)
         refuse(where, "nothing here reads mesh files; voxelize it first");
     return make_mesh_node(parser.assets.read_mesh(path, unit_m, z_up), where,
-                          open ? CloseRule::none : CloseRule::loops);
+                          close_settings(rule, shells));
 }
 
 Node parse_level_set(const json& body, const std::string& where, RecipeParser& parser) {

@@ -261,7 +261,7 @@ std::unique_ptr<Field> shape_field(const ShapeSettings& s, const Similarity& at)
         break;
     }
     return std::make_unique<MeshField>(
-        close_mesh(placed(shape_mesh(s), at), std::string(shape_name(s.kind)), CloseRule::none));
+        close_mesh(placed(shape_mesh(s), at), std::string(shape_name(s.kind)), {CloseRule::none}));
 }
 
 } // namespace taihu
