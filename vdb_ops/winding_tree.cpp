@@ -10,7 +10,7 @@
 namespace taihu {
 namespace {
 
-constexpr std::uint32_t kLeafTriangles = 8;
+constexpr std::uint32_t kLeafTriangles = 2;
 constexpr double kFar = 4;   // radii
 constexpr int kDeepest = 64; // halving 2^32 triangles takes half as many
 

@@ -308,7 +308,7 @@ TEST(MeshVariants, GiveTheSoundMeshesSolidOrSayWhatDiffers) {
         // the volume; a fifth of them may open half of a tube.
         EXPECT_LE(seen.worst_volume, name == "20 % missing, winding" ? 0.1 : 0.01) << name;
         EXPECT_LE(seen.worst_sign_off, name == "20 % missing, winding" ? 0.1 : 0.01) << name;
-        EXPECT_LE(seen.steepest, 1 + 1e-3) << name; // floats of voxels
+        EXPECT_LE(seen.steepest, 1 + 2e-3) << name; // a face counts as passed to 1e-3 beyond
         // Nested shells that vanish are told by their count, welding of equal corners is no fault.
         EXPECT_EQ(seen.said.empty(), name == "as it is" || name == "unwelded")
             << name << ": " << seen.said;
