@@ -2,7 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <numbers>
+#include <span>
 
 #include <nlohmann/json.hpp>
 
@@ -16,8 +18,8 @@
 namespace taihu {
 namespace {
 
-constexpr std::uint32_t kStream = 0x63617665; // "cave"
-constexpr int kTries = 64, kMostSmaller = 15; // to 3.5 % of the width
+constexpr std::uint32_t kStream = 0x63617665;              // "cave"
+constexpr int kTries = 64, kChoice = 4, kMostSmaller = 15; // to 3.5 % of the width
 
 void check_range(const char* name, double value, double lo, double hi) {
     if (!(value >= lo && value <= hi))
@@ -76,30 +78,44 @@ bool fits(const CaveSettings& s, const CaveRock& rock, bool first) {
     return true;
 }
 
-/// A place for `rock` in the mouth, or in one of the rocks before it.
-bool place(const CaveSettings& s, std::span<const Placed> before, Draws& draws, CaveRock& rock) {
+/// A place in the mouth.
+bool place_first(const CaveSettings& s, Draws& draws, CaveRock& rock) {
     for (int i = 0; i < kTries; ++i) {
-        if (before.empty()) {
-            rock.at_m = {draws.between(-0.25, 0.25) * s.size_m.x,
-                         draws.between(-0.3, 0) * s.size_m.y, 0.5 * s.size_m.z};
-            if (fits(s, rock, true))
-                return true;
-            continue;
-        }
-        // Most often the last one, so that the cave leads on; else any, so that it branches.
-        const std::size_t n = before.size();
-        const Placed& parent =
-            draws.next() < 0.6
-                ? before[n - 1]
-                : before[static_cast<std::size_t>(draws.next() * static_cast<double>(n))];
-        const auto vertex = static_cast<std::size_t>(
-            draws.next() * static_cast<double>(parent.mesh.positions.size()));
-        const Vec3 inside = parent.mesh.positions[vertex] * draws.between(0.7, 0.95);
-        rock.at_m = parent.rock.at_m + inside;
-        if (fits(s, rock, false) && is_inside(parent.mesh, inside))
+        rock.at_m = {draws.between(-0.25, 0.25) * s.size_m.x, draws.between(-0.3, 0) * s.size_m.y,
+                     0.5 * s.size_m.z};
+        if (fits(s, rock, true))
             return true;
     }
     return false;
+}
+
+/// A place in one of the rocks before it: of a few that do, the one farthest from all of them, so
+/// that the cave leads on.
+bool place_next(const CaveSettings& s, std::span<const Placed> before, Draws& draws,
+                CaveRock& rock) {
+    double farthest = -1;
+    Vec3 best;
+    for (int i = 0, n_found = 0; i < kTries && n_found < kChoice; ++i) {
+        const auto any = [&](std::size_t n) {
+            return static_cast<std::size_t>(draws.next() * static_cast<double>(n));
+        };
+        const Placed& parent = draws.next() < 0.5 ? before.back() : before[any(before.size())];
+        const Vec3 inside =
+            parent.mesh.positions[any(parent.mesh.positions.size())] * draws.between(0.7, 0.95);
+        rock.at_m = parent.rock.at_m + inside;
+        if (!fits(s, rock, false) || !is_inside(parent.mesh, inside))
+            continue;
+        ++n_found;
+        double nearest = std::numeric_limits<double>::infinity();
+        for (const Placed& other : before)
+            nearest = std::min(nearest, length(rock.at_m - other.rock.at_m));
+        if (nearest > farthest) {
+            farthest = nearest;
+            best = rock.at_m;
+        }
+    }
+    rock.at_m = best;
+    return farthest >= 0;
 }
 
 } // namespace
@@ -123,7 +139,9 @@ std::vector<CaveRock> cave_rocks(const CaveSettings& s) {
         next.mesh = shape_mesh(shape);
         if (!is_inside(next.mesh, {}))
             continue; // another rock, whose middle is in it
-        for (int smaller = 0; !place(s, placed, draws, next.rock); ++smaller) {
+        for (int smaller = 0; !(placed.empty() ? place_first(s, draws, next.rock)
+                                               : place_next(s, placed, draws, next.rock));
+             ++smaller) {
             if (smaller == kMostSmaller)
                 throw Error(Fault::bad_argument, "cave: there is no place for rock " +
                                                      std::to_string(placed.size()) +
@@ -144,7 +162,8 @@ std::vector<CaveRock> cave_rocks(const CaveSettings& s) {
 std::string cave_node(const CaveSettings& settings) {
     using Json = nlohmann::ordered_json;
     const std::vector<CaveRock> rocks = cave_rocks(settings);
-    Json of = {Json::parse(shape_node({.kind = ShapeKind::box, .size_m = settings.size_m}))};
+    Json of = Json::array();
+    of.push_back(Json::parse(shape_node({.kind = ShapeKind::box, .size_m = settings.size_m})));
     for (const CaveRock& rock : rocks)
         of.push_back({{"transform",
                        {{"of", Json::parse(shape_node(rock.shape))},

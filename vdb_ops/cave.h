@@ -14,7 +14,7 @@ namespace taihu {
 /// A block with a cave in it.
 struct CaveSettings {
     Vec3 size_m{1, 1, 1}; ///< of the block, about the origin [m], each > 0
-    int n_rocks = 14;     ///< taken away, 1..200
+    int n_rocks = 20;     ///< taken away, 1..200
     double room = 0.45;   ///< mean width of a rock / shortest side of the block, 0.05..0.9
     double wall = 0.05;   ///< least thickness of the block's walls / its shortest side, 0..0.4
     FractalSettings fractal{.iterations = 2}; ///< of the rocks
