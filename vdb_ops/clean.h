@@ -14,9 +14,9 @@ struct CleanSettings {
     bool fill_bubbles = true; ///< fill voids that no way leads to from outside
 };
 
-struct CleanResult {
-    openvdb::FloatGrid::Ptr solid; ///< a new grid on the same lattice
-    std::size_t n_pieces = 0;      ///< found
+/// What was found and done.
+struct CleanCounts {
+    std::size_t n_pieces = 0; ///< found
     std::size_t n_pieces_removed = 0;
     std::size_t n_bubbles = 0; ///< found, once the pieces are gone
     std::size_t n_bubbles_filled = 0;
@@ -24,8 +24,12 @@ struct CleanResult {
     double filled_m3 = 0;  ///< volume of the bubbles that were filled
 };
 
+struct CleanResult : CleanCounts {
+    openvdb::FloatGrid::Ptr solid; ///< a new grid on the same lattice
+};
+
 /// Loose fragments away and sealed bubbles shut. Solid and void voxels connect over faces; the
-/// largest piece is the one of most voxels, at ties the first in tree order. Distances near what
+/// largest piece is the one of most voxels, at ties the one that begins first. Distances near what
 /// went are rebuilt from the surface that stays (within 0.2 voxel there, unchanged elsewhere). The
 /// same bits on any number of threads. O(leaves), plus 1 KiB a leaf. \throws Error bad_argument as
 /// lattice_of(); bad_input: nothing solid is there, or the box of the solid

@@ -9,6 +9,7 @@ namespace taihu {
 struct VdbFile {
     openvdb::FloatGrid::Ptr solid;
     std::string recipe; ///< JSON text of what made it, or empty
+    std::string tile;   ///< of a tile: JSON text of its box and of what it belongs to, or empty
 };
 
 /// The first level set of a .vdb file.
@@ -26,5 +27,10 @@ openvdb::FloatGrid::Ptr read_volume(const std::filesystem::path& path);
 /// bytes. In one step, as write_file(). \throws Error io.
 void write_vdb(const std::filesystem::path& path, const openvdb::FloatGrid& solid,
                const std::string& recipe);
+
+/// The bytes of such a file. \param where  stands for it in messages. \param tile  of a tile:
+/// metadata taihu_tile.
+std::string format_vdb(const openvdb::FloatGrid& solid, const std::string& recipe,
+                       const std::string& where, const std::string& tile = {});
 
 } // namespace taihu
