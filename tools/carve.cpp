@@ -8,8 +8,13 @@
 #include "stats/io/holes_file.h"
 #include "tools/holes_options.h"
 #include "tools/solid_files.h"
+#include "tools/tile_files.h"
+#include "vdb_ops/balls_field.h"
 #include "vdb_ops/carve.h"
 #include "vdb_ops/clean.h"
+#include "vdb_ops/csg_field.h"
+#include "vdb_ops/level_set_field.h"
+#include "vdb_ops/rasterize.h"
 #include "vdb_ops/recipe.h"
 
 namespace taihu {
@@ -21,6 +26,7 @@ struct CarveArgs {
     PlacementOptions placement;
     std::string pieces = "largest", bubbles = "fill";
     SurfaceOptions surface;
+    TileOptions tiles;
 };
 
 /// The holes of a table, or of a law placed in the base.
@@ -83,21 +89,53 @@ void tell(const CarveArgs& args, const LawHoles& holes, std::size_t n_unresolved
                     where, *args.placement.porosity);
 }
 
+/// The holes taken away tile by tile: only the base is in memory.
+void write_carved_tiles(const CarveArgs& args, const Solid& base, const LawHoles& holes,
+                        const TileSettings& settings, const std::string& recipe,
+                        const Console& console) {
+    const DifferenceField rock(std::make_shared<LevelSetField>(base.grid),
+                               std::make_shared<BallsField>(holes.placed.holes));
+    const TilesResult made =
+        write_tiles(args.out, rock, lattice_of(*base.grid), settings, recipe, console.progress);
+    const std::string where = args.out.string();
+    console.say_all(where, holes.comments);
+    console.say("{}: carved {} holes", where, holes.placed.holes.size());
+    console.say_all(where, cleaning_lines(*made.cleaned));
+    auto json = tiles_result(args.out, made, console);
+    json["holes"] = holes.placed.holes.size();
+    json["found"] = base.found;
+    console.result(json);
+}
+
+/// Where the output may go.
+void check_output(const CarveArgs& args, const Console& console) {
+    if (!args.tiles.tiles) {
+        check_solid_path(args.out);
+        console.may_write(args.out, {args.base.path, args.holes, args.placement.where});
+        return args.surface.check(args.out);
+    }
+    if (args.surface.any())
+        throw Error(Fault::bad_argument, "--tiles: are level sets; drop --max-error, --uniform and "
+                                         "--no-draco");
+    console.may_write_tiles(args.out);
+}
+
 void run(const CarveArgs& args, const Console& console) {
-    check_solid_path(args.out);
-    console.may_write(args.out, {args.base.path, args.holes, args.placement.where});
-    args.surface.check(args.out);
+    check_output(args, console);
     const CleanSettings cleaning = clean_settings(args);
     const Solid base = read_solid(args.base, console);
     const LawHoles holes = read_or_place(args, base, console);
+    const std::string recipe = format_recipe(clean_node(difference_node(base.node, holes.node),
+                                                        cleaning.n_pieces, cleaning.fill_bubbles),
+                                             base.measure.voxel_m, args.placement.seed.value_or(0));
+    if (args.tiles.tiles)
+        return write_carved_tiles(args, base, holes, {*args.tiles.tiles, cleaning}, recipe,
+                                  console);
     report_stage(console.progress, "carving");
     const CarveResult rock = carve(*base.grid, holes.placed.holes, console.progress);
     const CarvedVolume carved = carved_volume(*base.grid, *rock.rock);
     report_stage(console.progress, "cleaning");
     const CleanResult cleaned = clean(*rock.rock, cleaning, console.progress);
-    const std::string recipe = format_recipe(clean_node(difference_node(base.node, holes.node),
-                                                        cleaning.n_pieces, cleaning.fill_bubbles),
-                                             base.measure.voxel_m, args.placement.seed.value_or(0));
     const std::size_t n_missed = count_missing(holes.placed.holes, *base.grid);
     tell(args, holes, rock.n_unresolved, carved, cleaned, n_missed, console);
     auto json = write_solid(args.out, *cleaned.solid, recipe, args.surface, console);
@@ -144,6 +182,7 @@ void add_carve(CLI::App& app, Console& console) {
         ->capture_default_str();
     args->base.add_voxel_options(*verb);
     args->surface.add_options(*verb);
+    args->tiles.add_option(*verb);
     verb->callback([args, &console] { console.with_threads([&] { run(*args, console); }); });
 }
 

@@ -1,11 +1,21 @@
 #include "vdb_ops/clean.h"
 
 #include "stats/core/error.h"
+#include "stats/number_detail.h"
 #include "vdb_ops/flips_detail.h"
 #include "vdb_ops/rasterize.h"
 #include "vdb_ops/volume.h"
 
 namespace taihu {
+
+std::vector<std::string> cleaning_lines(const CleanCounts& counts) {
+    if (counts.n_pieces_removed + counts.n_bubbles_filled == 0)
+        return {};
+    return {std::to_string(counts.n_pieces_removed) + " of " + std::to_string(counts.n_pieces) +
+            " pieces removed (" + rounded(counts.removed_m3) + " m^3), " +
+            std::to_string(counts.n_bubbles_filled) + " of " + std::to_string(counts.n_bubbles) +
+            " sealed bubbles filled (" + rounded(counts.filled_m3) + " m^3)"};
+}
 
 CleanResult clean(const openvdb::FloatGrid& solid, const CleanSettings& settings,
                   Progress* progress) {

@@ -1,6 +1,8 @@
 #pragma once
 #include <cstddef>
 #include <optional>
+#include <string>
+#include <vector>
 
 #include <openvdb/openvdb.h>
 
@@ -23,6 +25,9 @@ struct CleanCounts {
     double removed_m3 = 0; ///< volume of the pieces that went
     double filled_m3 = 0;  ///< volume of the bubbles that were filled
 };
+
+/// A line for people on each kind of thing that was removed or filled; none where nothing was.
+std::vector<std::string> cleaning_lines(const CleanCounts& counts);
 
 struct CleanResult : CleanCounts {
     openvdb::FloatGrid::Ptr solid; ///< a new grid on the same lattice

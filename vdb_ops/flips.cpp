@@ -10,6 +10,7 @@
 #include <tbb/parallel_for.h>
 
 #include "stats/core/error.h"
+#include "vdb_ops/kernels_detail.h"
 #include "vdb_ops/rasterize.h"
 
 namespace taihu {
@@ -27,22 +28,49 @@ int reach_vox(float half_width_vox) {
     return static_cast<int>(std::ceil(half_width_vox)) + 2;
 }
 
+/// A place where a grid edge crosses the surface, in voxels from a leaf's first.
+using Crossing = std::array<float, 3>;
+
+/// squared[512] = the least squared distance [voxels^2] from each voxel of a leaf to `points`, at
+/// most that of `far`. Rows farther than that are skipped.
+TAIHU_CLONES
+void nearest_squared(const Crossing* points, std::size_t n, float far, float* squared) {
+    const float far2 = far * far;
+    for (int v = 0; v < 512; ++v)
+        squared[v] = far2;
+    for (std::size_t i = 0; i < n; ++i) {
+        float dz2[8];
+        for (int z = 0; z < 8; ++z) {
+            const float dz = points[i][2] - static_cast<float>(z);
+            dz2[z] = dz * dz;
+        }
+        for (int x = 0; x < 8; ++x) {
+            const float dx = points[i][0] - static_cast<float>(x);
+            for (int y = 0; y < 8; ++y) {
+                const float dy = points[i][1] - static_cast<float>(y);
+                const float row = dx * dx + dy * dy;
+                if (row >= far2)
+                    continue;
+                float* out = squared + 64 * x + 8 * y;
+                for (int z = 0; z < 8; ++z)
+                    out[z] = row + dz2[z] < out[z] ? row + dz2[z] : out[z];
+            }
+        }
+    }
+}
+
 /// A leaf and its surroundings after the choice, as far as the band reaches.
 class Neighbourhood {
 public:
-    Neighbourhood(const openvdb::FloatGrid::ConstAccessor& accessor, const MaskAccessor& mask,
+    Neighbourhood(const openvdb::FloatGrid::ConstAccessor& values, const MaskAccessor& mask,
                   const Coord& leaf, int reach)
-        : reach_(reach), size_(8 + 2 * reach) {
-        const auto n = static_cast<std::size_t>(size_);
-        old_.reserve(n * n * n);
-        for (int x = 0; x < size_; ++x)
-            for (int y = 0; y < size_; ++y)
-                for (int z = 0; z < size_; ++z) {
-                    const Coord c = leaf.offsetBy(x - reach, y - reach, z - reach);
-                    old_.push_back(accessor.getValue(c));
-                    flipped_.push_back(mask.isValueOn(c));
-                    any_flipped_ |= flipped_.back() != 0;
-                }
+        : reach_(reach), size_(8 + 2 * reach),
+          old_(static_cast<std::size_t>(size_ * size_ * size_)), flipped_(old_.size()) {
+        const Coord lo = leaf.offsetBy(-reach), hi = leaf.offsetBy(7 + reach);
+        for (int x = lo.x() >> 3; x <= hi.x() >> 3; ++x)
+            for (int y = lo.y() >> 3; y <= hi.y() >> 3; ++y)
+                for (int z = lo.z() >> 3; z <= hi.z() >> 3; ++z)
+                    copy_block(values, mask, Coord(x, y, z) << 3, lo, hi);
         if (any_flipped_)
             find_crossings();
     }
@@ -52,26 +80,29 @@ public:
     bool flipped(int x, int y, int z) const {
         return flipped_[index(x + reach_, y + reach_, z + reach_)] != 0;
     }
-    /// Distance [voxels] from a voxel of the leaf to the nearest place where a grid edge crosses
-    /// the surface that stays, or the one that goes; at most `far`.
-    float to_staying(int x, int y, int z, float far) const {
-        return nearest(staying_, x, y, z, far);
-    }
-    float to_going(int x, int y, int z, float far) const { return nearest(going_, x, y, z, far); }
+    /// Where the surface that stays, and the one that goes, cross the edges of the grid.
+    const std::vector<Crossing>& staying() const { return staying_; }
+    const std::vector<Crossing>& going() const { return going_; }
 
 private:
-    using Points = std::vector<std::array<float, 3>>;
-    static float nearest(const Points& points, int x, int y, int z, float far) {
-        float best2 = far * far;
-        for (const auto& c : points) {
-            const float dx = c[0] - static_cast<float>(x), dy = c[1] - static_cast<float>(y),
-                        dz = c[2] - static_cast<float>(z);
-            best2 = std::min(best2, dx * dx + dy * dy + dz * dz);
-        }
-        return std::sqrt(best2);
-    }
     std::size_t index(int x, int y, int z) const {
         return static_cast<std::size_t>((x * size_ + y) * size_ + z);
+    }
+    void copy_block(const openvdb::FloatGrid::ConstAccessor& values, const MaskAccessor& mask,
+                    const Coord& block, const Coord& lo, const Coord& hi) {
+        const Leaf* leaf = values.probeConstLeaf(block);
+        const auto* bits = mask.probeConstLeaf(block);
+        const float value = leaf ? 0 : values.getValue(block);
+        const bool on = !bits && mask.isValueOn(block);
+        CoordBBox box(block, block.offsetBy(7));
+        box.intersect(CoordBBox(lo, hi));
+        for (auto at = box.begin(); at != box.end(); ++at) {
+            const Coord from = *at - lo;
+            const std::size_t i = index(from.x(), from.y(), from.z());
+            old_[i] = leaf ? leaf->getValue(*at) : value;
+            flipped_[i] = bits ? bits->isValueOn(*at) : on;
+            any_flipped_ |= flipped_[i] != 0;
+        }
     }
     void find_crossings() {
         const std::size_t strides[3] = {index(1, 0, 0), index(0, 1, 0), 1};
@@ -86,9 +117,9 @@ private:
                         const std::size_t q = p + strides[axis];
                         if ((old_[p] < 0) == (old_[q] < 0))
                             continue;
-                        std::array<float, 3> point = {static_cast<float>(x - reach_),
-                                                      static_cast<float>(y - reach_),
-                                                      static_cast<float>(z - reach_)};
+                        Crossing point = {static_cast<float>(x - reach_),
+                                          static_cast<float>(y - reach_),
+                                          static_cast<float>(z - reach_)};
                         point[axis] += old_[p] / (old_[p] - old_[q]);
                         (flipped_[p] || flipped_[q] ? going_ : staying_).push_back(point);
                     }
@@ -99,25 +130,28 @@ private:
     bool any_flipped_ = false;
     std::vector<float> old_;
     std::vector<char> flipped_;
-    Points staying_, going_; // in voxels from the leaf's first
+    std::vector<Crossing> staying_, going_;
 };
 
 /// Rebuild the values of one leaf whose surroundings changed.
 void rebuild_leaf(Leaf& leaf, const Neighbourhood& near, float half_width, float voxel) {
     const float background = half_width * voxel;
+    // Looked for a voxel beyond the band: crossings of edges are a little farther than the
+    // surface.
+    const float far = half_width + 1;
+    alignas(64) float staying[512], going[512];
+    nearest_squared(near.staying().data(), near.staying().size(), far, staying);
+    nearest_squared(near.going().data(), near.going().size(), far, going);
     for (int v = 0; v < 512; ++v) {
         const int x = v / 64, y = v / 8 % 8, z = v % 8;
         const float old = near.old(x, y, z);
         const bool flipped = near.flipped(x, y, z);
         if (!flipped && std::fabs(old) >= background)
             continue;
-        // Looked for a voxel beyond the band: crossings of edges are a little farther than the
-        // surface.
-        const float d = near.to_staying(x, y, z, half_width + 1);
         // The nearest surface stays: its exact distance is better than the one rebuilt.
-        if (!flipped && near.to_going(x, y, z, half_width + 1) >= d)
+        if (!flipped && going[v] >= staying[v])
             continue;
-        const float value = std::min(d * voxel, background);
+        const float value = std::min(std::sqrt(staying[v]) * voxel, background);
         const auto offset = static_cast<openvdb::Index>(v);
         leaf.setValueOnly(offset, (old < 0) != flipped ? -value : value);
         leaf.setActiveState(offset, value < background);

@@ -12,6 +12,7 @@
 #include "stats/core/sphere.h"
 #include "stats/core/tri_mesh.h"
 #include "vdb_ops/recipe.h"
+#include "vdb_ops/tiles.h"
 
 namespace taihu {
 
@@ -32,13 +33,21 @@ struct RecipeSettings {
     double coarsen = 1; ///< times the voxel that all this comes to, 1..64: to see what it will be
 };
 
-struct RecipeSolid {
-    openvdb::FloatGrid::Ptr solid;
+/// What is made of a recipe, but for the solid.
+struct RecipeReport {
     double voxel_m = 0;
     std::optional<RecipeLod> lod;
     std::string recipe;             ///< what makes it again, the settings in it
     std::vector<Sphere> holes;      ///< that were carved, in the order of the recipe [m]
     std::vector<std::string> found; ///< what was repaired, placed and removed, by node
+};
+
+struct RecipeSolid : RecipeReport {
+    openvdb::FloatGrid::Ptr solid;
+};
+
+struct RecipeTiles : RecipeReport {
+    TilesResult tiles;
 };
 
 /// Makes the solid of a recipe (version 1, data/schema/recipe.schema.json).
@@ -56,6 +65,15 @@ struct RecipeSolid {
 RecipeSolid make_recipe(const std::string& recipe, const std::string& where,
                         const RecipeAssets& assets, const RecipeSettings& settings = {},
                         Progress* progress = nullptr);
+
+/// The same as tiles in a folder, for solids that are larger than memory: their union is, bit for
+/// bit, what make_recipe() makes. Where the recipe ends in `clean`, that is done across tiles; a
+/// `clean` inside of it, and holes of a law, need the level set of what they are made in.
+/// \param tile_voxels  as TileSettings. \throws Error as make_recipe() and write_tiles().
+RecipeTiles make_recipe_tiles(const std::string& recipe, const std::string& where,
+                              const RecipeAssets& assets, const RecipeSettings& settings,
+                              const std::filesystem::path& folder, int tile_voxels,
+                              Progress* progress = nullptr);
 
 /// A recipe with one value changed: `key` is a name that its `set` explains (`porosity`), or a path
 /// of names and numbers (`/solid/sphere/size_m/0`) to something that is there.
