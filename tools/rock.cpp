@@ -1,6 +1,4 @@
 // taihu rock: a whole recipe, made.
-#include <chrono>
-
 #include "mesh_out/lod.h"
 #include "stats/core/error.h"
 #include "stats/core/file.h"
@@ -15,11 +13,9 @@
 namespace taihu {
 namespace {
 
-constexpr double kCoarse = 4; // voxels of a dry run, times those of the run itself
-
 struct RockArgs {
     std::filesystem::path recipe, from, out, report, holes;
-    std::string preset, voxel, height;
+    std::string preset, voxel, height, memory;
     std::optional<int> dim;
     std::optional<std::uint64_t> seed;
     std::vector<std::string> settings;
@@ -80,6 +76,9 @@ RecipeSettings recipe_settings(const RockArgs& args) {
         s.voxel_m = length_m("--voxel", args.voxel);
     if (!args.height.empty())
         s.height_m = length_m("--height", args.height);
+    if (!args.memory.empty())
+        s.memory_bytes = memory_bytes("--memory", args.memory);
+    s.meshed = !args.out.empty() && !args.tiles.tiles && !is_vdb(args.out);
     return s;
 }
 
@@ -100,21 +99,23 @@ void list_presets(const Console& console) {
     console.result(json);
 }
 
-/// How much a run will need, by a coarser one.
-void estimate(const Source& source, const RecipeAssets& assets, RecipeSettings settings,
+/// How much a run will need.
+void estimate(const Source& source, const RecipeAssets& assets, const RecipeSettings& settings,
               const Console& console) {
-    const auto start = std::chrono::steady_clock::now();
-    settings.coarsen = kCoarse;
-    const RecipeSolid coarse =
-        make_recipe(source.text, source.where, assets, settings, console.progress);
-    const std::chrono::duration<double> took = std::chrono::steady_clock::now() - start;
-    const double leaves = kCoarse * kCoarse * static_cast<double>(coarse.solid->tree().leafCount());
-    const double bytes = 2200 * leaves; // 512 floats, a mask and its place in the tree
-    const double voxel_m = coarse.voxel_m / kCoarse;
-    console.say("{}: voxel {:.4g} m, about {:.0f} leaves, {:.0f} MB of level set, {:.1f} s to make "
-                "it on this machine",
-                source.where, voxel_m, leaves, bytes / 1e6, kCoarse * kCoarse * took.count());
-    console.result({{"voxel_m", voxel_m}, {"leaves", leaves}, {"bytes", bytes}});
+    const RecipeEstimate e =
+        estimate_recipe(source.text, source.where, assets, settings, console.progress);
+    const double bytes = e.memory.bytes();
+    console.say("{}: voxel {:.4g} m, about {:.0f} leaves, {} of memory at the peak, {:.1f} s to "
+                "rasterize it on this machine",
+                source.where, e.voxel_m, e.size.n_leaves, human_bytes(bytes), e.size.seconds);
+    if (bytes > e.limit_bytes)
+        console.say("{}: more than the {} there are; use a larger voxel, or --tiles", source.where,
+                    human_bytes(e.limit_bytes));
+    console.result({{"voxel_m", e.voxel_m},
+                    {"leaves", e.size.n_leaves},
+                    {"bytes", bytes},
+                    {"seconds", e.size.seconds},
+                    {"fits", bytes <= e.limit_bytes}});
 }
 
 nlohmann::ordered_json write_levels(const RockArgs& args, const RecipeSolid& made,
@@ -229,6 +230,8 @@ void add_rock(CLI::App& app, Console& console) {
     verb->add_option("--voxel", args->voxel, "or the size of a voxel, as 5mm")->excludes(dim);
     verb->add_option("--assets", args->assets, "More folders with the recipe's files");
     args->tiles.add_option(*verb);
+    verb->add_option("--memory", args->memory,
+                     "Refuse what would need more, as 4GB [what the machine has left]");
     verb->add_flag("--dry-run", args->dry_run, "Say what it will need, and make nothing");
     args->surface.add_options(*verb);
     verb->callback([args, &console] { console.with_threads([&] { run(*args, console); }); });

@@ -1,25 +1,57 @@
 #include "vdb_ops/clean.h"
 
+#include <cmath>
+
 #include "stats/core/error.h"
 #include "stats/number_detail.h"
 #include "vdb_ops/flips_detail.h"
+#include "vdb_ops/necks_detail.h"
 #include "vdb_ops/rasterize.h"
 #include "vdb_ops/volume.h"
 
 namespace taihu {
 
 std::vector<std::string> cleaning_lines(const CleanCounts& counts) {
+    std::vector<std::string> lines;
+    if (counts.n_necked > 0)
+        lines.push_back(std::to_string(counts.n_necked) + " parts on thin necks cut off (" +
+                        rounded(counts.necked_m3) + " m^3)");
     if (counts.n_pieces_removed + counts.n_bubbles_filled == 0)
-        return {};
-    return {std::to_string(counts.n_pieces_removed) + " of " + std::to_string(counts.n_pieces) +
-            " pieces removed (" + rounded(counts.removed_m3) + " m^3), " +
-            std::to_string(counts.n_bubbles_filled) + " of " + std::to_string(counts.n_bubbles) +
-            " sealed bubbles filled (" + rounded(counts.filled_m3) + " m^3)"};
+        return lines;
+    lines.push_back(
+        std::to_string(counts.n_pieces_removed) + " of " + std::to_string(counts.n_pieces) +
+        " pieces removed (" + rounded(counts.removed_m3) + " m^3), " +
+        std::to_string(counts.n_bubbles_filled) + " of " + std::to_string(counts.n_bubbles) +
+        " sealed bubbles filled (" + rounded(counts.filled_m3) + " m^3)");
+    return lines;
+}
+
+void check_clean_settings(const CleanSettings& settings) {
+    if (!(settings.min_neck_m >= 0) || !std::isfinite(settings.min_neck_m))
+        throw Error(Fault::bad_argument,
+                    "clean: min_neck_m is " + shortest(settings.min_neck_m) + ", must be >= 0");
+    if (settings.min_neck_m > 0 && !settings.n_pieces)
+        throw Error(Fault::bad_argument, "clean: thin necks are cut to drop what hangs on them; "
+                                         "say how many pieces stay, not all");
 }
 
 CleanResult clean(const openvdb::FloatGrid& solid, const CleanSettings& settings,
                   Progress* progress) {
     lattice_of(solid);
+    check_clean_settings(settings);
+    if (settings.min_neck_m > 0) {
+        CleanSettings rest = settings;
+        rest.min_neck_m = 0;
+        const Necked necked = find_necked(solid, settings.min_neck_m, *settings.n_pieces, progress);
+        if (necked.n_parts == 0)
+            return clean(solid, rest, progress);
+        const auto cut =
+            flip(solid, necked.voxels, openvdb::CoordBBox::inf(), progress, Flipped::cut);
+        CleanResult result = clean(*cut, rest, progress);
+        result.n_necked = necked.n_parts;
+        result.necked_m3 = volume_m3(solid) - volume_m3(*cut);
+        return result;
+    }
     openvdb::CoordBBox box;
     if (!solid.tree().evalLeafBoundingBox(box))
         throw Error(Fault::bad_input,

@@ -83,6 +83,8 @@ public:
     /// Where the surface that stays, and the one that goes, cross the edges of the grid.
     const std::vector<Crossing>& staying() const { return staying_; }
     const std::vector<Crossing>& going() const { return going_; }
+    /// New surface, where a cut goes through what was on one side.
+    const std::vector<Crossing>& cut() const { return cut_; }
 
 private:
     std::size_t index(int x, int y, int z) const {
@@ -115,13 +117,17 @@ private:
                         if (at[axis] + 1 == size_)
                             continue;
                         const std::size_t q = p + strides[axis];
-                        if ((old_[p] < 0) == (old_[q] < 0))
+                        const bool crossing = (old_[p] < 0) != (old_[q] < 0);
+                        if (!crossing && flipped_[p] == flipped_[q])
                             continue;
                         Crossing point = {static_cast<float>(x - reach_),
                                           static_cast<float>(y - reach_),
                                           static_cast<float>(z - reach_)};
-                        point[axis] += old_[p] / (old_[p] - old_[q]);
-                        (flipped_[p] || flipped_[q] ? going_ : staying_).push_back(point);
+                        point[axis] += crossing ? old_[p] / (old_[p] - old_[q]) : 0.5f;
+                        (!crossing                    ? cut_
+                         : flipped_[p] || flipped_[q] ? going_
+                                                      : staying_)
+                            .push_back(point);
                     }
                 }
     }
@@ -130,7 +136,7 @@ private:
     bool any_flipped_ = false;
     std::vector<float> old_;
     std::vector<char> flipped_;
-    std::vector<Crossing> staying_, going_;
+    std::vector<Crossing> staying_, going_, cut_;
 };
 
 /// Rebuild the values of one leaf whose surroundings changed.
@@ -139,19 +145,21 @@ void rebuild_leaf(Leaf& leaf, const Neighbourhood& near, float half_width, float
     // Looked for a voxel beyond the band: crossings of edges are a little farther than the
     // surface.
     const float far = half_width + 1;
-    alignas(64) float staying[512], going[512];
+    alignas(64) float staying[512], going[512], cut[512];
     nearest_squared(near.staying().data(), near.staying().size(), far, staying);
     nearest_squared(near.going().data(), near.going().size(), far, going);
+    nearest_squared(near.cut().data(), near.cut().size(), far, cut);
     for (int v = 0; v < 512; ++v) {
         const int x = v / 64, y = v / 8 % 8, z = v % 8;
         const float old = near.old(x, y, z);
         const bool flipped = near.flipped(x, y, z);
-        if (!flipped && std::fabs(old) >= background)
+        const bool by_cut = cut[v] < staying[v];
+        if (!flipped && !by_cut && std::fabs(old) >= background)
             continue;
         // The nearest surface stays: its exact distance is better than the one rebuilt.
-        if (!flipped && going[v] >= staying[v])
+        if (!flipped && !by_cut && going[v] >= staying[v])
             continue;
-        const float value = std::min(std::sqrt(staying[v]) * voxel, background);
+        const float value = std::min(std::sqrt(std::min(staying[v], cut[v])) * voxel, background);
         const auto offset = static_cast<openvdb::Index>(v);
         leaf.setValueOnly(offset, (old < 0) != flipped ? -value : value);
         leaf.setActiveState(offset, value < background);
@@ -161,8 +169,9 @@ void rebuild_leaf(Leaf& leaf, const Neighbourhood& near, float half_width, float
 /// The leaves and tiles of a node of 128^3 voxels, some of them flipped.
 class Flipper {
 public:
-    Flipper(const openvdb::FloatGrid& grid, const openvdb::MaskTree& mask, const CoordBBox& region)
-        : grid_(grid), mask_(mask), region_(region), lattice_(lattice_of(grid)),
+    Flipper(const openvdb::FloatGrid& grid, const openvdb::MaskTree& mask, const CoordBBox& region,
+            Flipped what)
+        : grid_(grid), mask_(mask), region_(region), what_(what), lattice_(lattice_of(grid)),
           reach_(flip_reach_blocks(lattice_.half_width_vox)) {}
 
     /// Null, and whether it lies inside, where the node comes out uniform.
@@ -191,15 +200,15 @@ public:
     }
 
 private:
-    /// A copy of the leaf at `origin`, rebuilt where something changes near it; null without one.
+    /// The leaf at `origin`, rebuilt where something changes near it; null without either.
     std::unique_ptr<Leaf> leaf(const openvdb::FloatGrid::ConstAccessor& values,
                                const MaskAccessor& mask, const Coord& origin) const {
         const Leaf* old = values.probeConstLeaf(origin);
-        if (!old)
-            return nullptr;
-        auto leaf = std::make_unique<Leaf>(*old);
-        if (!any_near(mask, origin))
-            return leaf;
+        if ((!old && what_ == Flipped::parts) || !any_near(mask, origin))
+            return old ? std::make_unique<Leaf>(*old) : nullptr;
+        // A cut through uniform blocks leaves a surface in them.
+        auto leaf = old ? std::make_unique<Leaf>(*old)
+                        : std::make_unique<Leaf>(origin, values.getValue(origin), false);
         const Neighbourhood near(values, mask, origin, reach_vox(lattice_.half_width_vox));
         if (near.any_flipped())
             rebuild_leaf(*leaf, near, lattice_.half_width_vox,
@@ -221,6 +230,7 @@ private:
     const openvdb::FloatGrid& grid_;
     const openvdb::MaskTree& mask_;
     CoordBBox region_;
+    Flipped what_;
     Lattice lattice_;
     int reach_;
 };
@@ -314,8 +324,8 @@ int flip_reach_blocks(float half_width_vox) {
 }
 
 openvdb::FloatGrid::Ptr flip(const openvdb::FloatGrid& grid, const openvdb::MaskTree& mask,
-                             const openvdb::CoordBBox& region, Progress* progress) {
-    const Flipper flipper(grid, mask, region);
+                             const openvdb::CoordBBox& region, Progress* progress, Flipped what) {
+    const Flipper flipper(grid, mask, region, what);
     const std::vector<Coord> origins = nodes_of(grid.tree(), mask);
     std::vector<std::unique_ptr<Node>> nodes(origins.size());
     std::vector<char> inside(origins.size(), 0);

@@ -27,10 +27,15 @@ CleanChoice choose_parts(const std::vector<Components::Part>& parts,
 /// How many blocks of 8^3 around a leaf decide what flip() makes of it.
 int flip_reach_blocks(float half_width_vox);
 
+/// What the voxels are: whole parts, or some of a part, so that a cut leaves surface where none
+/// was.
+enum class Flipped { parts, cut };
+
 /// The leaves and tiles of `grid` in `region`, with the voxels of `mask` on the other side.
 /// Distances near them are rebuilt from the surface that stays. A leaf depends on what is within
 /// flip_reach_blocks() of it alone.
 openvdb::FloatGrid::Ptr flip(const openvdb::FloatGrid& grid, const openvdb::MaskTree& mask,
-                             const openvdb::CoordBBox& region, Progress* progress);
+                             const openvdb::CoordBBox& region, Progress* progress,
+                             Flipped what = Flipped::parts);
 
 } // namespace taihu

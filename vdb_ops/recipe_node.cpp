@@ -403,7 +403,7 @@ public:
     openvdb::FloatGrid::Ptr grid(const RecipeScene& scene, const Similarity& at) const override {
         const auto of = of_->grid(scene, at);
         report_stage(scene.progress, "cleaning");
-        const CleanResult result = clean(*of, settings_, scene.progress);
+        const CleanResult result = clean(*of, settings(at), scene.progress);
         for (const std::string& line : cleaning_lines(result))
             scene.found.push_back(where_ + ": " + line);
         return result.solid;
@@ -418,6 +418,11 @@ public:
     const openvdb::FloatGrid* lattice_giver() const override { return of_->lattice_giver(); }
 
 private:
+    CleanSettings settings(const Similarity& at) const {
+        CleanSettings placed = settings_;
+        placed.min_neck_m *= at.scale();
+        return placed;
+    }
     Node of_;
     CleanSettings settings_;
     std::string where_;

@@ -11,6 +11,7 @@
 #include "stats/core/progress.h"
 #include "stats/core/sphere.h"
 #include "stats/core/tri_mesh.h"
+#include "vdb_ops/estimate.h"
 #include "vdb_ops/recipe.h"
 #include "vdb_ops/tiles.h"
 
@@ -29,8 +30,9 @@ struct RecipeSettings {
     std::optional<double> voxel_m = {};  ///< > 0
     std::optional<int> dim = {};         ///< or voxels along the longest axis, 4..65536
     std::optional<double> height_m = {}; ///< all is scaled so that the solid's box is so high, > 0
-    std::optional<std::uint64_t> seed = {}; ///< of everything that has no seed of its own
-    double coarsen = 1; ///< times the voxel that all this comes to, 1..64: to see what it will be
+    std::optional<std::uint64_t> seed = {};  ///< of everything that has no seed of its own
+    std::optional<double> memory_bytes = {}; ///< at most so much, of what the machine has left
+    bool meshed = false;                     ///< a surface is made of it, which needs memory, too
 };
 
 /// What is made of a recipe, but for the solid.
@@ -61,10 +63,25 @@ struct RecipeTiles : RecipeReport {
 /// \param where  stands for the recipe in messages: `rock.json`.
 /// \throws Error bad_input: not a recipe, with the node, the key, the value and what it may be; a
 ///         file that is another than the one meant; bad_argument: a setting; io: a file that is
-///         missing or cannot be read; unsupported: too large; what the operators throw.
+///         missing or cannot be read; unsupported: more memory than there is; what the operators
+///         throw.
 RecipeSolid make_recipe(const std::string& recipe, const std::string& where,
                         const RecipeAssets& assets, const RecipeSettings& settings = {},
                         Progress* progress = nullptr);
+
+/// What make_recipe() will need.
+struct RecipeEstimate {
+    double voxel_m = 0;
+    SizeEstimate size;
+    MemoryUse memory;
+    double limit_bytes = 0;
+};
+
+/// By estimate_size(); holes of a law are placed in a solid of at most 128 voxels for it.
+/// \throws Error as make_recipe(), but for memory.
+RecipeEstimate estimate_recipe(const std::string& recipe, const std::string& where,
+                               const RecipeAssets& assets, const RecipeSettings& settings = {},
+                               Progress* progress = nullptr);
 
 /// The same as tiles in a folder, for solids that are larger than memory: their union is, bit for
 /// bit, what make_recipe() makes. Where the recipe ends in `clean`, that is done across tiles; a

@@ -227,6 +227,12 @@ TilesResult write_tiles(const fs::path& folder, const Field& field, const Lattic
         throw Error(Fault::bad_argument, "tiles: an edge of " +
                                              std::to_string(settings.tile_voxels) +
                                              " voxels, must be a multiple of 128 in 128..4096");
+    if (settings.clean)
+        check_clean_settings(*settings.clean);
+    if (settings.clean && settings.clean->min_neck_m > 0)
+        throw Error(Fault::unsupported,
+                    "tiles: necks are not seen in tiles; drop min_neck, or make "
+                    "the whole with a larger voxel");
     empty_level_set(lattice); // refuses what is none
     const auto sampled = field.on(lattice, CoordBBox::inf());
     make_room(folder);
@@ -276,6 +282,25 @@ openvdb::FloatGrid::Ptr read_tile(const fs::path& folder, const Tile& tile) {
         throw Error(Fault::bad_input, path.string() + ": another file than the one that " +
                                           kTileSetName + " means; write the tiles again");
     return read_vdb(path).solid;
+}
+
+VdbFile read_solid_vdb(const fs::path& path) {
+    VdbFile file = read_vdb(path);
+    if (file.tile.empty())
+        return file;
+    const std::string where = base_name(path) + ": taihu_tile";
+    const json tile = parse_json(file.tile, where);
+    const CoordBBox box = box_of(tile.is_object() ? tile.value("box", json()) : json(), where);
+    openvdb::CoordBBox leaves;
+    const bool any = file.solid->tree().evalLeafBoundingBox(leaves);
+    bool whole = !box.empty() && (!any || box.isInside(leaves));
+    for (int axis = 0; axis < 3 && whole; ++axis)
+        whole =
+            box.min()[axis] % 8 == 0 && box.dim()[axis] % 8 == 0 && box.dim()[axis] <= kMostTile;
+    if (!whole)
+        throw Error(Fault::bad_input, where + ": its box is not that of a tile; write it again");
+    file.solid = tile_solid(*file.solid, box);
+    return file;
 }
 
 openvdb::FloatGrid::Ptr read_tiles(const fs::path& set_path, Progress* progress) {

@@ -63,6 +63,10 @@ TileSet read_tile_set(const std::filesystem::path& path);
 /// One tile of a set. \throws Error bad_input: another file than the set means; as read_vdb().
 openvdb::FloatGrid::Ptr read_tile(const std::filesystem::path& folder, const Tile& tile);
 
+/// A tile as a solid of its own, for what needs a closed one: cut off half a voxel within its box.
+openvdb::FloatGrid::Ptr tile_solid(const openvdb::FloatGrid& tile, const openvdb::CoordBBox& box,
+                                   Progress* progress = nullptr);
+
 /// All tiles as one level set, where that fits into memory.
 openvdb::FloatGrid::Ptr read_tiles(const std::filesystem::path& set, Progress* progress = nullptr);
 

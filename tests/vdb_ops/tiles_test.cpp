@@ -35,10 +35,19 @@ DifferenceField holed_ball(int n_holes = 600) {
 
 /// Values, states, leaves and inside tiles, the latter where they are in the tree.
 void expect_same(const openvdb::FloatGrid& a, const openvdb::FloatGrid& b) {
-    EXPECT_EQ(grid_hash(a), grid_hash(b));
-    EXPECT_EQ(a.tree().leafCount(), b.tree().leafCount());
+    ASSERT_EQ(a.tree().leafCount(), b.tree().leafCount());
     EXPECT_TRUE(a.tree().hasSameTopology(b.tree()));
     EXPECT_EQ(a.transform(), b.transform());
+    EXPECT_EQ(a.background(), b.background());
+    for (auto i = a.tree().cbeginLeaf(), j = b.tree().cbeginLeaf(); i; ++i, ++j)
+        ASSERT_TRUE(*i == *j) << i->origin();
+    auto depth = [](auto tiles) { // leaves are compared
+        tiles.setMaxDepth(tiles.getLeafDepth() - 1);
+        return tiles;
+    };
+    for (auto i = depth(a.tree().cbeginValueAll()), j = depth(b.tree().cbeginValueAll()); i;
+         ++i, ++j)
+        ASSERT_TRUE(j && i.getCoord() == j.getCoord() && *i == *j) << i.getCoord();
 }
 
 TEST(Tiles, TheirUnionIsTheWholeBitForBit) {
@@ -193,6 +202,33 @@ TEST(Tiles, ATileSaysWhatItIs) {
     const VdbFile file = read_vdb(folder / "t" / made.set.tiles[0].file);
     EXPECT_EQ(file.tile, R"({"box":[[-128,-128,-128],[-1,-1,-1]],"of":"tiles.json"})");
     EXPECT_EQ(file.recipe, ""); // a tile is not what the recipe makes
+}
+
+TEST(Tiles, ATileCanBeASolidOfItsOwn) {
+    const BallsField ball(std::array<Sphere, 1>{{{{}, 1}}});
+    const Lattice lattice{0.02, {}, 3};
+    const Scratch folder;
+    const TilesResult made = write_tiles(folder / "t", ball, lattice, {128, {}}, "");
+    double sum_m3 = 0;
+    for (const Tile& t : made.set.tiles) {
+        const auto raw = read_vdb(folder / "t" / t.file).solid;
+        const auto solid = read_solid_vdb(folder / "t" / t.file).solid;
+        sum_m3 += volume_m3(*solid);
+        CoordBBox within = t.box;
+        within.expand(-4);
+        for (auto it = raw->cbeginValueOn(); it; ++it) {
+            if (!within.isInside(it.getCoord()))
+                continue;
+            // To voxels and back: the last bits of a float.
+            ASSERT_NEAR(solid->tree().getValue(it.getCoord()), *it, 1e-7);
+        }
+    }
+    EXPECT_EQ(made.set.tiles.size(), 8u);
+    // Half a voxel goes at each face of the three planes between voxels -1 and 0, and the voxel
+    // between them: slabs of w, which meet in bars of w * w * 2 m. Edges of boxes are rounded by
+    // less than a voxel.
+    const double w = 0.04;
+    EXPECT_NEAR(sum_m3, 4.0 / 3 * M_PI - 3 * M_PI * w + 3 * 2 * w * w, 2e-3);
 }
 
 } // namespace
