@@ -5,6 +5,7 @@
 #include "tools/shape_cave.h"
 #include "tools/shape_stages.h"
 #include "tools/solid_files.h"
+#include "vdb_ops/estimate.h"
 #include "vdb_ops/rasterize.h"
 #include "vdb_ops/recipe.h"
 #include "vdb_ops/shapes.h"
@@ -14,7 +15,7 @@ namespace taihu {
 namespace {
 
 struct ShapeArgs {
-    std::string kind, size = "1m", tube, round, voxel, damping, along, bump;
+    std::string kind, size = "1m", tube, round, voxel, memory, damping, along, bump;
     std::filesystem::path out, stages;
     ShapeSettings settings;
     CaveSettings cave;
@@ -169,16 +170,24 @@ void run(ShapeArgs& args, const CLI::App& verb, const Console& console) {
         Lattice lattice;
         lattice.voxel_m = args.voxel.empty() ? voxel_for(box, args.dim.value_or(kDefaultDim))
                                              : length_m("--voxel", args.voxel, {0, box.longest()});
-        refuse_if_too_large(area_m2(mesh), box, lattice.voxel_m);
+        refuse_if_too_large(0, box, lattice.voxel_m);
+        const auto field = shape_field(args.settings);
+        std::optional<double> asked;
+        if (!args.memory.empty())
+            asked = memory_bytes("--memory", args.memory);
+        const double limit = memory_limit_bytes(asked);
+        if (may_exceed(box, lattice.voxel_m, {}, limit))
+            refuse_if_over({.leaves = estimate_size(*field, lattice).n_leaves}, lattice.voxel_m,
+                           limit);
         report_stage(console.progress, "rasterizing");
-        const auto grid = rasterize(*shape_field(args.settings), lattice, console.progress);
+        const auto grid = rasterize(*field, lattice, console.progress);
         json.update(write_solid(args.out, *grid,
                                 format_recipe(node, lattice.voxel_m, args.settings.seed), {},
                                 console));
     } else {
-        if (args.dim || !args.voxel.empty())
+        if (args.dim || !args.voxel.empty() || !args.memory.empty())
             throw Error(Fault::bad_argument,
-                        "shape: --dim and --voxel are for a .vdb; a mesh takes "
+                        "shape: --dim, --voxel and --memory are for a .vdb; a mesh takes "
                         "--subdivisions");
         const MeshFormat format = *mesh_format(args.out);
         const std::string bytes =
@@ -264,6 +273,8 @@ void add_shape(CLI::App& app, Console& console) {
         verb->add_option("--dim", args->dim, "A .vdb, a cave: voxels along the longest axis [256]")
             ->check(CLI::Range(4, 65536));
     verb->add_option("--voxel", args->voxel, "or the size of a voxel, as 5mm")->excludes(dim);
+    verb->add_option("--memory", args->memory,
+                     "A .vdb: refuse what would need more, as 4GB [what the machine has left]");
     verb->callback(
         [args, verb, &console] { console.with_threads([&] { run(*args, *verb, console); }); });
 }

@@ -86,7 +86,7 @@ Solid read_solid(const SolidOptions& options, const Console& console) {
                         where +
                             ": a level set keeps its own voxels and units; drop --dim, --voxel, "
                             "--close, --shells, --unit and --up, or voxelize the mesh again");
-        VdbFile file = read_vdb(options.path);
+        VdbFile file = read_solid_vdb(options.path);
         solid.grid = file.solid;
         const auto made = recipe_solid(file.recipe);
         solid.node = made ? *made : level_set_node(name, sha256_hex(read_file(options.path)));

@@ -52,6 +52,7 @@ struct SurfaceOptions {
     bool uniform = false, no_draco = false;
     std::optional<std::string> max_error;
     void add_options(CLI::App& verb);
+    bool any() const { return uniform || no_draco || max_error; }
     /// \throws Error bad_argument: an option that has no meaning for this output.
     void check(const std::filesystem::path& out) const;
     SurfaceSettings settings(const Measure& measure) const;

@@ -135,13 +135,15 @@ std::string difference_node(const std::string& of, const std::string& minus) {
 }
 
 std::string clean_node(const std::string& of, std::optional<std::size_t> n_pieces,
-                       bool fill_bubbles) {
+                       bool fill_bubbles, double min_neck_m) {
     Json body = {{"of", parsed(of)}};
     if (n_pieces)
         body["pieces"] = *n_pieces;
     else
         body["pieces"] = "all";
     body["bubbles"] = fill_bubbles ? "fill" : "keep";
+    if (min_neck_m > 0)
+        body["min_neck_m"] = min_neck_m;
     return node("clean", std::move(body));
 }
 

@@ -33,9 +33,9 @@ struct HoleSources {
 std::string holes_node(const std::string& name, const std::string& sha256,
                        const Placement& placement, const HoleSources& sources = {});
 std::string difference_node(const std::string& of, const std::string& minus);
-/// \param n_pieces  absent: all.
+/// \param n_pieces  absent: all. \param min_neck_m  0: no key.
 std::string clean_node(const std::string& of, std::optional<std::size_t> n_pieces,
-                       bool fill_bubbles);
+                       bool fill_bubbles, double min_neck_m = 0);
 
 struct RecipeLod {
     int n_levels = 1;
