@@ -269,7 +269,7 @@ nlohmann::ordered_json make_tile(const ReliefArgs& args, Plan plan, const Consol
 void run(const ReliefArgs& args, const CLI::App& verb, const Console& console) {
     if (args.kind.empty() == args.from.empty())
         throw Error(Fault::bad_argument,
-                    "relief: say what to make, as `relief broken-rock`, or --from FILE");
+                    "relief: say what to make: a kind, as broken-rock, or --from FILE, not both");
     const bool photo = has_extension(args.from, ".png");
     if (!args.from.empty() && !photo && !has_extension(args.from, ".exr") &&
         !has_extension(args.from, ".json"))

@@ -28,8 +28,9 @@ ExrImage sample(std::vector<std::string> channels, int width = 37, int height = 
     return exr;
 }
 
-/// Without the care of write_file(), which waits for the disk.
+/// Without the care of write_file(), which waits for the disk, as some do to cut a file short.
 void spill(const std::filesystem::path& path, std::string_view bytes) {
+    std::filesystem::remove(path);
     std::ofstream(path, std::ios::binary) << bytes;
 }
 
