@@ -91,6 +91,7 @@ void add_info(CLI::App& app, Console& console);
 void add_lod(CLI::App& app, Console& console);
 void add_measure(CLI::App& app, Console& console);
 void add_mesh(CLI::App& app, Console& console);
+void add_relief(CLI::App& app, Console& console);
 void add_render(CLI::App& app, Console& console);
 void add_rock(CLI::App& app, Console& console);
 void add_sample(CLI::App& app, Console& console);

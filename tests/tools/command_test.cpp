@@ -15,7 +15,7 @@ using testing::StartsWith;
 
 const std::vector<std::string> kVerbs = {"fit",    "sample", "shape", "voxelize", "carve",
                                          "mesh",   "lod",    "check", "measure",  "section",
-                                         "render", "info",   "rock"};
+                                         "render", "info",   "rock",  "relief"};
 
 long lines(const std::string& text) {
     return std::count(text.begin(), text.end(), '\n');
