@@ -43,6 +43,8 @@ CleanResult clean(const openvdb::FloatGrid& solid, const CleanSettings& settings
         CleanSettings rest = settings;
         rest.min_neck_m = 0;
         const Necked necked = find_necked(solid, settings.min_neck_m, *settings.n_pieces, progress);
+        if (necked.n_pieces > 0)
+            rest.n_pieces = necked.n_pieces;
         if (necked.n_parts == 0)
             return clean(solid, rest, progress);
         const auto cut =

@@ -182,6 +182,7 @@ Necked find_necked(const openvdb::FloatGrid& solid, double min_neck_m, std::size
             ++necked.n_parts;
         }
     }
+    necked.n_pieces = static_cast<std::size_t>(std::count(held.begin(), held.end(), char{1}));
     if (necked.n_parts == 0)
         return necked;
     Territories territories(*depth, cores, stays, goes);

@@ -11,6 +11,7 @@ namespace taihu {
 struct Necked {
     openvdb::MaskTree voxels;
     std::size_t n_parts = 0;
+    std::size_t n_pieces = 0; ///< that hold the cores that stay: two may be in one
 };
 
 /// What is deeper than half the thickness falls into cores; the `n_stay` largest stay. The rest of
