@@ -26,6 +26,7 @@ struct CarveArgs {
     SolidOptions base;
     std::filesystem::path holes, out;
     PlacementOptions placement;
+    double foot_deg = 0;
     std::string pieces = "largest", bubbles = "fill", memory, min_neck;
     SurfaceOptions surface;
     TileOptions tiles;
@@ -88,6 +89,8 @@ void tell(const CarveArgs& args, const LawHoles& holes, std::size_t n_unresolved
         "({:.3g} m^3)",
         where, cleaned.n_pieces, cleaned.n_pieces_removed, cleaned.removed_m3, cleaned.n_bubbles,
         cleaned.n_bubbles_filled, cleaned.filled_m3);
+    if (cleaned.foot)
+        console.say("{}: {}", where, foot_line(cleaned));
     console.say("{}: porosity {:.4f} as carved, {:.4f} once cleaned", where, carved.porosity(),
                 final_porosity(carved, cleaned));
     if (args.placement.porosity && std::fabs(carved.porosity() - *args.placement.porosity) > 0.005)
@@ -149,11 +152,11 @@ void run(const CarveArgs& args, const Console& console) {
     const Solid base = read_solid(args.base, console);
     if (!args.min_neck.empty())
         cleaning.min_neck_m = length_m("--min-neck", args.min_neck, base.measure);
+    cleaning.foot_deg = args.foot_deg;
     check_clean_settings(cleaning);
     const LawHoles holes = read_or_place(args, base, console);
     const std::string recipe =
-        format_recipe(clean_node(difference_node(base.node, holes.node), cleaning.n_pieces,
-                                 cleaning.fill_bubbles, cleaning.min_neck_m),
+        format_recipe(clean_node(difference_node(base.node, holes.node), cleaning),
                       base.measure.voxel_m, args.placement.seed.value_or(0));
     if (args.tiles.tiles)
         return write_carved_tiles(args, base, holes, {*args.tiles.tiles, cleaning}, recipe,
@@ -176,6 +179,11 @@ void run(const CarveArgs& args, const Console& console) {
     json["porosity_cleaned"] = final_porosity(carved, cleaned);
     json["necked"] = cleaned.n_necked;
     json["necked_m3"] = cleaned.necked_m3;
+    if (cleaned.foot)
+        json["foot"] = {{"cut_m", cleaned.foot->cut_m},
+                        {"cut_m3", cleaned.foot_m3},
+                        {"contact_m2", cleaned.foot->contact_m2},
+                        {"tilt_deg", cleaned.foot->tilt_deg}};
     json["pieces"] = cleaned.n_pieces;
     json["pieces_removed"] = cleaned.n_pieces_removed;
     json["pieces_removed_m3"] = cleaned.removed_m3;
@@ -214,6 +222,10 @@ void add_carve(CLI::App& app, Console& console) {
     verb->add_option("--min-neck", args->min_neck,
                      "Parts that hang on by thinner necks alone are pieces of their own: 5mm, "
                      "3vox or 2% [off]");
+    verb->add_option("--foot", args->foot_deg,
+                     "Cut flat below, so that it stands tilted by up to this many degrees, 0..60 "
+                     "[not cut]")
+        ->check(CLI::Range(0.0, 60.0));
     args->base.add_voxel_options(*verb);
     args->surface.add_options(*verb);
     args->tiles.add_option(*verb);

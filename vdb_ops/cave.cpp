@@ -168,7 +168,7 @@ std::string cave_node(const CaveSettings& settings) {
         of.push_back({{"transform",
                        {{"of", Json::parse(shape_node(rock.shape))},
                         {"move_m", {rock.at_m.x, rock.at_m.y, rock.at_m.z}}}}});
-    return clean_node(Json{{"difference", {{"of", std::move(of)}}}}.dump(), 1, true);
+    return clean_node(Json{{"difference", {{"of", std::move(of)}}}}.dump(), {});
 }
 
 CaveReport measure_cave(const openvdb::FloatGrid& solid, const Vec3& size_m,

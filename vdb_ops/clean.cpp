@@ -11,18 +11,28 @@
 
 namespace taihu {
 
+std::string foot_line(const CleanCounts& counts) {
+    const Foot& foot = *counts.foot;
+    return "stands tilted by up to " + rounded(foot.tilt_deg) + " degrees: " +
+           (foot.cut_m > 0 ? rounded(foot.cut_m) + " m cut off below (" + rounded(counts.foot_m3) +
+                                 " m^3), a foot of "
+                           : "nothing to cut, a foot of ") +
+           rounded(foot.contact_m2) + " m^2";
+}
+
 std::vector<std::string> cleaning_lines(const CleanCounts& counts) {
     std::vector<std::string> lines;
     if (counts.n_necked > 0)
         lines.push_back(std::to_string(counts.n_necked) + " parts on thin necks cut off (" +
                         rounded(counts.necked_m3) + " m^3)");
-    if (counts.n_pieces_removed + counts.n_bubbles_filled == 0)
-        return lines;
-    lines.push_back(
-        std::to_string(counts.n_pieces_removed) + " of " + std::to_string(counts.n_pieces) +
-        " pieces removed (" + rounded(counts.removed_m3) + " m^3), " +
-        std::to_string(counts.n_bubbles_filled) + " of " + std::to_string(counts.n_bubbles) +
-        " sealed bubbles filled (" + rounded(counts.filled_m3) + " m^3)");
+    if (counts.n_pieces_removed + counts.n_bubbles_filled > 0)
+        lines.push_back(
+            std::to_string(counts.n_pieces_removed) + " of " + std::to_string(counts.n_pieces) +
+            " pieces removed (" + rounded(counts.removed_m3) + " m^3), " +
+            std::to_string(counts.n_bubbles_filled) + " of " + std::to_string(counts.n_bubbles) +
+            " sealed bubbles filled (" + rounded(counts.filled_m3) + " m^3)");
+    if (counts.foot)
+        lines.push_back(foot_line(counts));
     return lines;
 }
 
@@ -33,12 +43,55 @@ void check_clean_settings(const CleanSettings& settings) {
     if (settings.min_neck_m > 0 && !settings.n_pieces)
         throw Error(Fault::bad_argument, "clean: thin necks are cut to drop what hangs on them; "
                                          "say how many pieces stay, not all");
+    if (!(settings.foot_deg >= 0 && settings.foot_deg <= 60))
+        throw Error(Fault::bad_argument,
+                    "clean: foot_deg is " + shortest(settings.foot_deg) + ", must be 0..60");
 }
+
+namespace {
+
+/// Cut until what is left stands: what a cut sets free moves the centre of mass.
+void stand(CleanResult& result, const CleanSettings& settings, Progress* progress) {
+    constexpr int kMostCuts = 16;
+    CleanSettings rest = settings;
+    rest.min_neck_m = rest.foot_deg = 0;
+    double cut_m = 0; // of the cuts before
+    for (int i = 0; i < kMostCuts; ++i) {
+        report_stage(progress, "looking for a foot");
+        result.foot = find_foot(*result.solid, settings.foot_deg);
+        if (!result.foot)
+            break;
+        const bool stands = result.foot->cut_m == 0;
+        cut_m = result.foot->cut_m += cut_m;
+        if (stands)
+            return;
+        const auto cut = cut_below(*result.solid, result.foot->y_m);
+        result.foot_m3 += volume_m3(*result.solid) - volume_m3(*cut);
+        const CleanResult again = clean(*cut, rest, progress);
+        result.n_pieces_removed += again.n_pieces_removed;
+        result.removed_m3 += again.removed_m3;
+        result.n_bubbles_filled += again.n_bubbles_filled;
+        result.filled_m3 += again.filled_m3;
+        result.solid = again.solid;
+    }
+    throw Error(Fault::numeric, "clean: the solid stands tilted by " + shortest(settings.foot_deg) +
+                                    " degrees on no cut below half its height; ask for less, or "
+                                    "turn it");
+}
+
+} // namespace
 
 CleanResult clean(const openvdb::FloatGrid& solid, const CleanSettings& settings,
                   Progress* progress) {
     lattice_of(solid);
     check_clean_settings(settings);
+    if (settings.foot_deg > 0) {
+        CleanSettings rest = settings;
+        rest.foot_deg = 0;
+        CleanResult result = clean(solid, rest, progress);
+        stand(result, settings, progress);
+        return result;
+    }
     if (settings.min_neck_m > 0) {
         CleanSettings rest = settings;
         rest.min_neck_m = 0;

@@ -134,16 +134,17 @@ std::string difference_node(const std::string& of, const std::string& minus) {
     return node("difference", {{"of", {parsed(of), parsed(minus)}}});
 }
 
-std::string clean_node(const std::string& of, std::optional<std::size_t> n_pieces,
-                       bool fill_bubbles, double min_neck_m) {
+std::string clean_node(const std::string& of, const CleanSettings& settings) {
     Json body = {{"of", parsed(of)}};
-    if (n_pieces)
-        body["pieces"] = *n_pieces;
+    if (settings.n_pieces)
+        body["pieces"] = *settings.n_pieces;
     else
         body["pieces"] = "all";
-    body["bubbles"] = fill_bubbles ? "fill" : "keep";
-    if (min_neck_m > 0)
-        body["min_neck_m"] = min_neck_m;
+    body["bubbles"] = settings.fill_bubbles ? "fill" : "keep";
+    if (settings.min_neck_m > 0)
+        body["min_neck_m"] = settings.min_neck_m;
+    if (settings.foot_deg > 0)
+        body["foot_deg"] = settings.foot_deg;
     return node("clean", std::move(body));
 }
 

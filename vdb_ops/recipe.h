@@ -4,6 +4,7 @@
 #include <string>
 
 #include "stats/io/measurements.h"
+#include "vdb_ops/clean.h"
 #include "vdb_ops/mesh_diagnosis.h"
 #include "vdb_ops/place.h"
 #include "vdb_ops/shapes.h"
@@ -33,9 +34,7 @@ struct HoleSources {
 std::string holes_node(const std::string& name, const std::string& sha256,
                        const Placement& placement, const HoleSources& sources = {});
 std::string difference_node(const std::string& of, const std::string& minus);
-/// \param n_pieces  absent: all. \param min_neck_m  0: no key.
-std::string clean_node(const std::string& of, std::optional<std::size_t> n_pieces,
-                       bool fill_bubbles, double min_neck_m = 0);
+std::string clean_node(const std::string& of, const CleanSettings& settings);
 
 struct RecipeLod {
     int n_levels = 1;

@@ -287,9 +287,10 @@ Node parse_embed(const json& body, const std::string& where, RecipeParser& parse
 }
 
 Node parse_clean(const json& body, const std::string& where, RecipeParser& parser) {
-    const Keys keys(body, where, {"of"}, {"pieces", "bubbles", "min_neck_m"});
+    const Keys keys(body, where, {"of"}, {"pieces", "bubbles", "min_neck_m", "foot_deg"});
     CleanSettings settings;
     settings.min_neck_m = keys.number_or("min_neck_m", 0, 0, kMost_m);
+    settings.foot_deg = keys.number_or("foot_deg", 0, 0, 60);
     if (keys.has("pieces") && keys.value("pieces") == "all")
         settings.n_pieces.reset();
     else if (keys.has("pieces"))

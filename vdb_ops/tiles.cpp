@@ -229,9 +229,9 @@ TilesResult write_tiles(const fs::path& folder, const Field& field, const Lattic
                                              " voxels, must be a multiple of 128 in 128..4096");
     if (settings.clean)
         check_clean_settings(*settings.clean);
-    if (settings.clean && settings.clean->min_neck_m > 0)
+    if (settings.clean && (settings.clean->min_neck_m > 0 || settings.clean->foot_deg > 0))
         throw Error(Fault::unsupported,
-                    "tiles: necks are not seen in tiles; drop min_neck, or make "
+                    "tiles: necks and feet are not seen in tiles; drop min_neck and foot, or make "
                     "the whole with a larger voxel");
     empty_level_set(lattice); // refuses what is none
     const auto sampled = field.on(lattice, CoordBBox::inf());

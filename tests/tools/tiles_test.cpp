@@ -105,6 +105,11 @@ TEST(TileCommands, NecksAreCutAndTheRecipeSaysSo) {
     EXPECT_GT(cut["necked_m3"].get<double>(), 0.1); // pi / 6 * 0.6^3 = 0.113
     must("taihu rock --from b.vdb -o again.vdb -q", folder);
     EXPECT_EQ(read_file(folder / "again.vdb"), read_file(folder / "b.vdb"));
+    const json stands = must(carve + "--foot 15 -o d.vdb", folder);
+    EXPECT_GE(stands["foot"]["tilt_deg"].get<double>(), 15);
+    EXPECT_GT(stands["foot"]["cut_m"].get<double>(), 0);
+    must("taihu rock --from d.vdb -o again.vdb -q", folder);
+    EXPECT_EQ(read_file(folder / "again.vdb"), read_file(folder / "d.vdb"));
     const Finished all = run(carve + "--pieces all --min-neck 20cm -o c.vdb", folder.path());
     EXPECT_EQ(all.exit_code, 2);
     EXPECT_THAT(all.err, HasSubstr("how many pieces stay"));
