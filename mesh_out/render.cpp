@@ -161,7 +161,7 @@ public:
     Painter(const RayScene& scene, const ScenePlacement& place, const View& view,
             const RenderSettings& settings, std::uint32_t stream)
         : scene_(scene), view_(view), settings_(settings), rng_{settings.seed, stream},
-          ground_(place.ground) {
+          place_(place), ground_(place.ground) {
         const double left = radians(kKeyLeftDeg), up = radians(kKeyUpDeg);
         key_ = {-std::sin(left) * std::cos(up), std::sin(up), std::cos(left) * std::cos(up)};
         key_frame_ = tangents(key_);
@@ -238,7 +238,9 @@ private:
         normal = side > 0 ? normal : side < 0 ? -normal : flat;
         const Vec3 at = corners[0] * (1 - hit.u - hit.v) + corners[1] * hit.u + corners[2] * hit.v +
                         flat * kRayOffset;
-        return settings_.albedo * (sky_light(at, normal, draws) + key_light(at, normal, draws));
+        const double albedo =
+            settings_.albedo_at ? settings_.albedo_at(place_.mesh_point(at)) : settings_.albedo;
+        return albedo * (sky_light(at, normal, draws) + key_light(at, normal, draws));
     }
 
     /// What the backdrop is multiplied by where the ray meets the ground: its light as a share of
@@ -298,6 +300,7 @@ private:
     const View& view_;
     const RenderSettings& settings_;
     Rng rng_;
+    ScenePlacement place_;
     double ground_;
     Vec3 key_;
     std::array<Vec3, 2> key_frame_;

@@ -1,5 +1,6 @@
 #pragma once
 #include <cstdint>
+#include <functional>
 #include <span>
 
 #include "stats/core/image.h"
@@ -16,9 +17,11 @@ struct RenderSettings {
     int samples = 16;              ///< paths per pixel, 1..4096
     int ao_rays = 5;               ///< sky rays per path, 1..256
     double albedo = 0.56;          ///< linear, 0..1
-    bool ground = true;            ///< a pale plain under the mesh that takes its shadow
-    bool wireframe = false;        ///< edges drawn over flat-shaded faces
-    bool smooth = true;            ///< shade with the mesh's normals where it has them
+    std::function<double(const Vec3&)> albedo_at = {}; ///< or at a place of the mesh [m], 0..1;
+                                                       ///< asked by many threads at a time
+    bool ground = true;     ///< a pale plain under the mesh that takes its shadow
+    bool wireframe = false; ///< edges drawn over flat-shaded faces
+    bool smooth = true;     ///< shade with the mesh's normals where it has them
     std::uint64_t seed = 0;
 };
 

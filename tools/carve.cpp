@@ -8,8 +8,15 @@
 #include "stats/io/holes_file.h"
 #include "tools/holes_options.h"
 #include "tools/solid_files.h"
+#include "tools/tile_files.h"
+#include "vdb_ops/balls_field.h"
 #include "vdb_ops/carve.h"
 #include "vdb_ops/clean.h"
+#include "vdb_ops/csg_field.h"
+#include "vdb_ops/estimate.h"
+#include "vdb_ops/level_set_box.h"
+#include "vdb_ops/level_set_field.h"
+#include "vdb_ops/rasterize.h"
 #include "vdb_ops/recipe.h"
 
 namespace taihu {
@@ -19,8 +26,10 @@ struct CarveArgs {
     SolidOptions base;
     std::filesystem::path holes, out;
     PlacementOptions placement;
-    std::string pieces = "largest", bubbles = "fill";
+    double foot_deg = 0;
+    std::string pieces = "largest", bubbles = "fill", memory, min_neck;
     SurfaceOptions surface;
+    TileOptions tiles;
 };
 
 /// The holes of a table, or of a law placed in the base.
@@ -57,7 +66,8 @@ CleanSettings clean_settings(const CarveArgs& args) {
 
 /// Share of the base that is gone in the end: holes and pieces away, bubbles filled again.
 double final_porosity(const CarvedVolume& carved, const CleanResult& cleaned) {
-    return (carved.removed_m3 + cleaned.removed_m3 - cleaned.filled_m3) / carved.base_m3;
+    return (carved.removed_m3 + cleaned.necked_m3 + cleaned.removed_m3 - cleaned.filled_m3) /
+           carved.base_m3;
 }
 
 void tell(const CarveArgs& args, const LawHoles& holes, std::size_t n_unresolved,
@@ -71,11 +81,16 @@ void tell(const CarveArgs& args, const LawHoles& holes, std::size_t n_unresolved
     if (n_missed > 0)
         console.say("{}: {} of {} holes do not touch the base; check their unit and place", where,
                     n_missed, n);
+    if (cleaned.n_necked > 0)
+        console.say("{}: {} part{} on thin necks cut off ({:.3g} m^3)", where, cleaned.n_necked,
+                    cleaned.n_necked == 1 ? "" : "s", cleaned.necked_m3);
     console.say(
         "{}: voxel pieces: {} found, {} removed ({:.3g} m^3); sealed bubbles: {} found, {} filled "
         "({:.3g} m^3)",
         where, cleaned.n_pieces, cleaned.n_pieces_removed, cleaned.removed_m3, cleaned.n_bubbles,
         cleaned.n_bubbles_filled, cleaned.filled_m3);
+    if (cleaned.foot)
+        console.say("{}: {}", where, foot_line(cleaned));
     console.say("{}: porosity {:.4f} as carved, {:.4f} once cleaned", where, carved.porosity(),
                 final_porosity(carved, cleaned));
     if (args.placement.porosity && std::fabs(carved.porosity() - *args.placement.porosity) > 0.005)
@@ -83,21 +98,75 @@ void tell(const CarveArgs& args, const LawHoles& holes, std::size_t n_unresolved
                     where, *args.placement.porosity);
 }
 
+/// The holes taken away tile by tile: only the base is in memory.
+void write_carved_tiles(const CarveArgs& args, const Solid& base, const LawHoles& holes,
+                        const TileSettings& settings, const std::string& recipe,
+                        const Console& console) {
+    const DifferenceField rock(std::make_shared<LevelSetField>(base.grid),
+                               std::make_shared<BallsField>(holes.placed.holes));
+    const TilesResult made =
+        write_tiles(args.out, rock, lattice_of(*base.grid), settings, recipe, console.progress);
+    const std::string where = args.out.string();
+    console.say_all(where, holes.comments);
+    console.say("{}: carved {} holes", where, holes.placed.holes.size());
+    console.say_all(where, cleaning_lines(*made.cleaned));
+    auto json = tiles_result(args.out, made, console);
+    json["holes"] = holes.placed.holes.size();
+    json["found"] = base.found;
+    console.result(json);
+}
+
+/// Before the work: whether base, rock and what is made of it fit into memory.
+void refuse_if_too_much(const CarveArgs& args, const Solid& base, const LawHoles& holes) {
+    std::optional<double> asked;
+    if (!args.memory.empty())
+        asked = memory_bytes("--memory", args.memory);
+    const double limit = memory_limit_bytes(asked);
+    MemoryUse use{.base_leaves = static_cast<double>(base.grid->tree().leafCount()),
+                  .cleaned = true,
+                  .meshed = !is_vdb(args.out)};
+    if (!may_exceed(level_set_box(*base.grid), base.measure.voxel_m, use, limit))
+        return;
+    const DifferenceField rock(std::make_shared<LevelSetField>(base.grid),
+                               std::make_shared<BallsField>(holes.placed.holes));
+    use.leaves = estimate_size(rock, lattice_of(*base.grid)).n_leaves;
+    refuse_if_over(use, base.measure.voxel_m, limit);
+}
+
+/// Where the output may go.
+void check_output(const CarveArgs& args, const Console& console) {
+    if (!args.tiles.tiles) {
+        check_solid_path(args.out);
+        console.may_write(args.out, {args.base.path, args.holes, args.placement.where});
+        return args.surface.check(args.out);
+    }
+    if (args.surface.any())
+        throw Error(Fault::bad_argument, "--tiles: are level sets; drop --max-error, --uniform and "
+                                         "--no-draco");
+    console.may_write_tiles(args.out);
+}
+
 void run(const CarveArgs& args, const Console& console) {
-    check_solid_path(args.out);
-    console.may_write(args.out, {args.base.path, args.holes, args.placement.where});
-    args.surface.check(args.out);
-    const CleanSettings cleaning = clean_settings(args);
+    check_output(args, console);
+    CleanSettings cleaning = clean_settings(args);
     const Solid base = read_solid(args.base, console);
+    if (!args.min_neck.empty())
+        cleaning.min_neck_m = length_m("--min-neck", args.min_neck, base.measure);
+    cleaning.foot_deg = args.foot_deg;
+    check_clean_settings(cleaning);
     const LawHoles holes = read_or_place(args, base, console);
+    const std::string recipe =
+        format_recipe(clean_node(difference_node(base.node, holes.node), cleaning),
+                      base.measure.voxel_m, args.placement.seed.value_or(0));
+    if (args.tiles.tiles)
+        return write_carved_tiles(args, base, holes, {*args.tiles.tiles, cleaning}, recipe,
+                                  console);
+    refuse_if_too_much(args, base, holes);
     report_stage(console.progress, "carving");
     const CarveResult rock = carve(*base.grid, holes.placed.holes, console.progress);
     const CarvedVolume carved = carved_volume(*base.grid, *rock.rock);
     report_stage(console.progress, "cleaning");
     const CleanResult cleaned = clean(*rock.rock, cleaning, console.progress);
-    const std::string recipe = format_recipe(clean_node(difference_node(base.node, holes.node),
-                                                        cleaning.n_pieces, cleaning.fill_bubbles),
-                                             base.measure.voxel_m, args.placement.seed.value_or(0));
     const std::size_t n_missed = count_missing(holes.placed.holes, *base.grid);
     tell(args, holes, rock.n_unresolved, carved, cleaned, n_missed, console);
     auto json = write_solid(args.out, *cleaned.solid, recipe, args.surface, console);
@@ -108,6 +177,13 @@ void run(const CarveArgs& args, const Console& console) {
     json["missed"] = n_missed;
     json["porosity"] = carved.porosity();
     json["porosity_cleaned"] = final_porosity(carved, cleaned);
+    json["necked"] = cleaned.n_necked;
+    json["necked_m3"] = cleaned.necked_m3;
+    if (cleaned.foot)
+        json["foot"] = {{"cut_m", cleaned.foot->cut_m},
+                        {"cut_m3", cleaned.foot_m3},
+                        {"contact_m2", cleaned.foot->contact_m2},
+                        {"tilt_deg", cleaned.foot->tilt_deg}};
     json["pieces"] = cleaned.n_pieces;
     json["pieces_removed"] = cleaned.n_pieces_removed;
     json["pieces_removed_m3"] = cleaned.removed_m3;
@@ -143,8 +219,18 @@ void add_carve(CLI::App& app, Console& console) {
     verb->add_option("--bubbles", args->bubbles, "Voids that no way leads to: fill or keep")
         ->check(CLI::IsMember({"fill", "keep"}))
         ->capture_default_str();
+    verb->add_option("--min-neck", args->min_neck,
+                     "Parts that hang on by thinner necks alone are pieces of their own: 5mm, "
+                     "3vox or 2% [off]");
+    verb->add_option("--foot", args->foot_deg,
+                     "Cut flat below, so that it stands tilted by up to this many degrees, 0..60 "
+                     "[not cut]")
+        ->check(CLI::Range(0.0, 60.0));
     args->base.add_voxel_options(*verb);
     args->surface.add_options(*verb);
+    args->tiles.add_option(*verb);
+    verb->add_option("--memory", args->memory,
+                     "Refuse what would need more, as 4GB [what the machine has left]");
     verb->callback([args, &console] { console.with_threads([&] { run(*args, console); }); });
 }
 

@@ -6,6 +6,7 @@
 
 #include "stats/core/error.h"
 #include "stats/core/text.h"
+#include "vdb_ops/tiles.h"
 
 namespace taihu {
 namespace {
@@ -112,6 +113,21 @@ void Console::may_write(const std::filesystem::path& path,
     if (no_clobber && std::filesystem::exists(path))
         throw Error(Fault::io,
                     path.string() + ": exists; choose another name, or drop --no-clobber");
+}
+
+void Console::may_write_tiles(const std::filesystem::path& folder) const {
+    namespace fs = std::filesystem;
+    std::error_code ignored;
+    if (fs::exists(folder, ignored) && !fs::is_directory(folder, ignored))
+        throw Error(Fault::io, folder.string() + ": is a file; --tiles needs the name of a folder");
+    const fs::path parent = folder.has_parent_path() ? folder.parent_path() : fs::path(".");
+    if (!fs::is_directory(parent, ignored))
+        throw Error(Fault::io, folder.string() + ": there is no folder " + parent.string() +
+                                   "; make it first");
+    const fs::path set = folder / kTileSetName;
+    if (no_clobber && fs::exists(set, ignored))
+        throw Error(Fault::io,
+                    set.string() + ": exists; choose another name, or drop --no-clobber");
 }
 
 } // namespace taihu

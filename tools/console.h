@@ -71,6 +71,8 @@ struct Console {
     ///   is one of the others.
     void may_write(const std::filesystem::path& path,
                    std::initializer_list<std::filesystem::path> others = {}) const;
+    /// The same of a folder for tiles, which may be there already.
+    void may_write_tiles(const std::filesystem::path& folder) const;
 };
 
 /// Exit code of a verb whose answer is no.
@@ -89,6 +91,7 @@ void add_info(CLI::App& app, Console& console);
 void add_lod(CLI::App& app, Console& console);
 void add_measure(CLI::App& app, Console& console);
 void add_mesh(CLI::App& app, Console& console);
+void add_relief(CLI::App& app, Console& console);
 void add_render(CLI::App& app, Console& console);
 void add_rock(CLI::App& app, Console& console);
 void add_sample(CLI::App& app, Console& console);

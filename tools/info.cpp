@@ -8,6 +8,7 @@
 #include "tools/solid_files.h"
 #include "vdb_ops/rasterize.h"
 #include "vdb_ops/recipe.h"
+#include "vdb_ops/tiles.h"
 #include "vdb_ops/vdb_file.h"
 
 namespace taihu {
@@ -19,13 +20,16 @@ Json vdb_info(const std::filesystem::path& path) {
     const VdbFile file = read_vdb(path);
     const Lattice lattice = lattice_of(*file.solid);
     const openvdb::CoordBBox box = file.solid->evalActiveVoxelBoundingBox();
-    return {{"kind", "level set"},
-            {"voxel_m", lattice.voxel_m},
-            {"half_width_vox", lattice.half_width_vox},
-            {"voxels", {box.dim().x(), box.dim().y(), box.dim().z()}},
-            {"active_voxels", file.solid->activeVoxelCount()},
-            {"leaves", file.solid->tree().leafCount()},
-            {"recipe", file.recipe}};
+    Json json = {{"kind", file.tile.empty() ? "level set" : "tile of a level set"}};
+    if (!file.tile.empty())
+        json["tile"] = Json::parse(file.tile, nullptr, false);
+    json.update({{"voxel_m", lattice.voxel_m},
+                 {"half_width_vox", lattice.half_width_vox},
+                 {"voxels", {box.dim().x(), box.dim().y(), box.dim().z()}},
+                 {"active_voxels", file.solid->activeVoxelCount()},
+                 {"leaves", file.solid->tree().leafCount()},
+                 {"recipe", file.recipe}});
+    return json;
 }
 
 Json mesh_info(const SolidOptions& options, const Console& console) {
@@ -50,13 +54,28 @@ Json mesh_info(const SolidOptions& options, const Console& console) {
     return json;
 }
 
-/// A law or a report, as it stands in its file.
+/// A law or a report as it stands in its file, or what a list of tiles comes to.
 Json json_info(const std::filesystem::path& path) {
     const Json text = Json::parse(read_file(path, std::size_t{16} << 20), nullptr, false);
     if (text.is_object() && text.contains("taihu_report")) {
         Json json = {{"kind", "report of levels of detail"}};
         json.update(text);
         return json;
+    }
+    if (text.is_object() && text.contains("taihu_tiles")) {
+        const TileSet set = read_tile_set(path);
+        std::size_t n_leaves = 0, n_bytes = 0;
+        for (const Tile& t : set.tiles) {
+            n_leaves += t.n_leaves;
+            n_bytes += t.n_bytes;
+        }
+        return {{"kind", "level set in tiles"},
+                {"voxel_m", set.lattice.voxel_m},
+                {"tile_voxels", set.tile_voxels},
+                {"tiles", set.tiles.size()},
+                {"leaves", n_leaves},
+                {"bytes", n_bytes},
+                {"recipe", set.recipe}};
     }
     read_law_file(path); // refuses what is none
     Json json = {{"kind", "law of hole diameters"}};
@@ -130,8 +149,8 @@ void add_info(CLI::App& app, Console& console) {
                               "  taihu info rock.vdb --json | jq .recipe");
     verb->add_option(
             "file", args->path,
-            "A solid or mesh (.vdb .obj .ply .stl .off .glb .drc), a law or report (.json), or a "
-            "table (.csv)")
+            "A solid or mesh (.vdb .obj .ply .stl .off .glb .drc), a law, report or list of tiles "
+            "(.json), or a table (.csv)")
         ->required();
     args->add_mesh_options(*verb);
     verb->callback([args, &console] { console.with_threads([&] { run(*args, console); }); });

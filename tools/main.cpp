@@ -89,6 +89,7 @@ int run(int argc, char** argv) {
     add_check(app, console);
     add_measure(app, console);
     add_section(app, console);
+    add_relief(app, console);
     add_render(app, console);
     add_info(app, console);
     if (argc < 2) {

@@ -1,6 +1,4 @@
 // taihu rock: a whole recipe, made.
-#include <chrono>
-
 #include "mesh_out/lod.h"
 #include "stats/core/error.h"
 #include "stats/core/file.h"
@@ -8,22 +6,22 @@
 #include "stats/io/holes_file.h"
 #include "tools/presets.h"
 #include "tools/solid_files.h"
+#include "tools/tile_files.h"
 #include "vdb_ops/recipe_solid.h"
 #include "vdb_ops/vdb_file.h"
 
 namespace taihu {
 namespace {
 
-constexpr double kCoarse = 4; // voxels of a dry run, times those of the run itself
-
 struct RockArgs {
     std::filesystem::path recipe, from, out, report, holes;
-    std::string preset, voxel, height;
+    std::string preset, voxel, height, memory;
     std::optional<int> dim;
     std::optional<std::uint64_t> seed;
     std::vector<std::string> settings;
     std::vector<std::filesystem::path> assets;
     SurfaceOptions surface;
+    TileOptions tiles;
     bool dry_run = false, list = false;
 };
 
@@ -78,6 +76,9 @@ RecipeSettings recipe_settings(const RockArgs& args) {
         s.voxel_m = length_m("--voxel", args.voxel);
     if (!args.height.empty())
         s.height_m = length_m("--height", args.height);
+    if (!args.memory.empty())
+        s.memory_bytes = memory_bytes("--memory", args.memory);
+    s.meshed = !args.out.empty() && !args.tiles.tiles && !is_vdb(args.out);
     return s;
 }
 
@@ -98,21 +99,23 @@ void list_presets(const Console& console) {
     console.result(json);
 }
 
-/// How much a run will need, by a coarser one.
-void estimate(const Source& source, const RecipeAssets& assets, RecipeSettings settings,
+/// How much a run will need.
+void estimate(const Source& source, const RecipeAssets& assets, const RecipeSettings& settings,
               const Console& console) {
-    const auto start = std::chrono::steady_clock::now();
-    settings.coarsen = kCoarse;
-    const RecipeSolid coarse =
-        make_recipe(source.text, source.where, assets, settings, console.progress);
-    const std::chrono::duration<double> took = std::chrono::steady_clock::now() - start;
-    const double leaves = kCoarse * kCoarse * static_cast<double>(coarse.solid->tree().leafCount());
-    const double bytes = 2200 * leaves; // 512 floats, a mask and its place in the tree
-    const double voxel_m = coarse.voxel_m / kCoarse;
-    console.say("{}: voxel {:.4g} m, about {:.0f} leaves, {:.0f} MB of level set, {:.1f} s to make "
-                "it on this machine",
-                source.where, voxel_m, leaves, bytes / 1e6, kCoarse * kCoarse * took.count());
-    console.result({{"voxel_m", voxel_m}, {"leaves", leaves}, {"bytes", bytes}});
+    const RecipeEstimate e =
+        estimate_recipe(source.text, source.where, assets, settings, console.progress);
+    const double bytes = e.memory.bytes();
+    console.say("{}: voxel {:.4g} m, about {:.0f} leaves, {} of memory at the peak, {:.1f} s to "
+                "rasterize it on this machine",
+                source.where, e.voxel_m, e.size.n_leaves, human_bytes(bytes), e.size.seconds);
+    if (bytes > e.limit_bytes)
+        console.say("{}: more than the {} there are; use a larger voxel, or --tiles", source.where,
+                    human_bytes(e.limit_bytes));
+    console.result({{"voxel_m", e.voxel_m},
+                    {"leaves", e.size.n_leaves},
+                    {"bytes", bytes},
+                    {"seconds", e.size.seconds},
+                    {"fits", bytes <= e.limit_bytes}});
 }
 
 nlohmann::ordered_json write_levels(const RockArgs& args, const RecipeSolid& made,
@@ -135,19 +138,38 @@ nlohmann::ordered_json write_levels(const RockArgs& args, const RecipeSolid& mad
     return nlohmann::ordered_json::parse(report);
 }
 
-void run(const RockArgs& args, const Console& console) {
-    if (args.list)
-        return list_presets(console);
+void write_holes(const RockArgs& args, const std::vector<Sphere>& holes, const std::string& where,
+                 const Console& console) {
+    if (args.holes.empty())
+        return;
+    const std::vector<std::string> comments = {"holes of " + where};
+    write_file(args.holes, format_holes(holes, comments));
+    console.say("{}: {} holes", args.holes.string(), holes.size());
+}
+
+/// Where the output may go.
+void check_output(const RockArgs& args, const Console& console) {
     if (args.out.empty() && !args.dry_run)
         throw Error(Fault::bad_argument,
                     "rock: say where to write it, as -o rock.glb, or --dry-run");
-    if (!args.out.empty()) {
+    if (args.tiles.tiles && (args.surface.any() || !args.report.empty()))
+        throw Error(Fault::bad_argument, "--tiles: are level sets; drop --max-error, --uniform, "
+                                         "--no-draco and --report");
+    if (!args.out.empty() && args.tiles.tiles) {
+        console.may_write_tiles(args.out);
+    } else if (!args.out.empty()) {
         check_solid_path(args.out);
         console.may_write(args.out, {args.recipe, args.from});
         args.surface.check(args.out);
     }
     if (!args.holes.empty())
         console.may_write(args.holes, {args.recipe, args.from, args.out});
+}
+
+void run(const RockArgs& args, const Console& console) {
+    if (args.list)
+        return list_presets(console);
+    check_output(args, console);
     Source source = source_of(args, console);
     change(source, args);
     const RecipeAssets assets{
@@ -157,14 +179,18 @@ void run(const RockArgs& args, const Console& console) {
         }};
     if (args.dry_run)
         return estimate(source, assets, recipe_settings(args), console);
+    if (args.tiles.tiles) {
+        const RecipeTiles made =
+            make_recipe_tiles(source.text, source.where, assets, recipe_settings(args), args.out,
+                              *args.tiles.tiles, console.progress);
+        console.say_all(args.out.string(), made.found);
+        write_holes(args, made.holes, source.where, console);
+        return console.result(tiles_result(args.out, made.tiles, console));
+    }
     const RecipeSolid made =
         make_recipe(source.text, source.where, assets, recipe_settings(args), console.progress);
     console.say_all(args.out.string(), made.found);
-    if (!args.holes.empty()) {
-        const std::vector<std::string> comments = {"holes of " + source.where};
-        write_file(args.holes, format_holes(made.holes, comments));
-        console.say("{}: {} holes", args.holes.string(), made.holes.size());
-    }
+    write_holes(args, made.holes, source.where, console);
     const bool levels = made.lod && mesh_format(args.out) == MeshFormat::glb;
     if (!levels && !args.report.empty())
         throw Error(Fault::bad_argument, "--report: is of levels of detail; write a .glb of a "
@@ -182,6 +208,7 @@ void add_rock(CLI::App& app, Console& console) {
         "  taihu rock --preset taihu --height 1.8m --seed 7 -o rock.glb\n"
         "  taihu rock --preset sponge --set porosity=0.6 --dim 200 -o sponge.vdb\n"
         "  taihu rock my_recipe.json --dry-run\n"
+        "  taihu rock my_recipe.json --dim 4096 --tiles 512 -o tiles\n"
         "  taihu rock --from rock.glb --assets meshes -o again.glb");
     verb->add_option("recipe", args->recipe, "Recipe (.json)");
     verb->add_option("--preset", args->preset, "or one that comes with taihu: see --list");
@@ -203,6 +230,9 @@ void add_rock(CLI::App& app, Console& console) {
                     ->check(CLI::Range(4, 65536));
     verb->add_option("--voxel", args->voxel, "or the size of a voxel, as 5mm")->excludes(dim);
     verb->add_option("--assets", args->assets, "More folders with the recipe's files");
+    args->tiles.add_option(*verb);
+    verb->add_option("--memory", args->memory,
+                     "Refuse what would need more, as 4GB [what the machine has left]");
     verb->add_flag("--dry-run", args->dry_run, "Say what it will need, and make nothing");
     args->surface.add_options(*verb);
     verb->callback([args, &console] { console.with_threads([&] { run(*args, console); }); });

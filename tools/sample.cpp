@@ -23,7 +23,7 @@ LawHoles sample(const SampleArgs& args, const Console& console) {
     if (!args.box.empty()) {
         if (args.solid.dim || !args.solid.voxel.empty() || args.solid.any_mesh_option())
             throw Error(Fault::bad_argument,
-                        "sample: --dim, --voxel, --close, --unit and --up are for --in");
+                        "sample: --dim, --voxel, --close, --shells, --unit and --up are for --in");
         const Box box{{0, 0, 0}, parse_size("--box", args.box)};
         return place_law(args.law, args.placement, {0, box.longest()},
                          [&](const Law& law, const Placement& p) {

@@ -1,5 +1,7 @@
 #include "tools/solid_files.h"
 
+#include <map>
+
 #include "mesh_out/extract.h"
 #include "stats/core/error.h"
 #include "stats/core/file.h"
@@ -39,8 +41,12 @@ void check_solid_path(const std::filesystem::path& path) {
 }
 
 void SolidOptions::add_mesh_options(CLI::App& verb) {
-    verb.add_option("--unit", unit_m,
-                    "A mesh file's unit of length in metres: 0.01 for centimetres [1]")
+    static const std::map<std::string, std::string> kUnits = {{"um", "1e-6"},   {"mm", "1e-3"},
+                                                              {"cm", "1e-2"},   {"m", "1"},
+                                                              {"in", "0.0254"}, {"ft", "0.3048"}};
+    verb.add_option("--unit,--units", unit_m,
+                    "A mesh file's unit of length: um, mm, cm, m, in, ft, or so many metres [m]")
+        ->transform(CLI::Transformer(kUnits).description(""))
         ->check(CLI::Range(1e-9, 1e9));
     verb.add_option("--up", up, "A mesh file's axis that points up [y]")
         ->check(CLI::IsMember({"y", "z"}));
@@ -51,9 +57,20 @@ void SolidOptions::add_voxel_options(CLI::App& verb) {
         verb.add_option("--dim", dim, "A mesh: voxels along its longest axis, 4..65536 [256]")
             ->check(CLI::Range(4, 65536));
     verb.add_option("--voxel", voxel, "or the size of a voxel, as 5mm")->excludes(by_dim);
-    verb.add_option("--close", close, "An open mesh: cap its boundary loops, or refuse it [loops]")
-        ->check(CLI::IsMember({"loops", "none"}));
+    verb.add_option("--close", close,
+                    "An open mesh: loops caps each boundary loop; winding fills what the faces "
+                    "mostly surround, across gaps; plane builds a flat base, under terrain too; "
+                    "none refuses it [loops]")
+        ->check(CLI::IsMember({"loops", "winding", "plane", "none"}));
+    verb.add_option("--shells", shells,
+                    "A mesh of several closed surfaces: union of their insides (one turned inward "
+                    "in another is a cavity), or parity: each inside another is hollow [union]")
+        ->check(CLI::IsMember({"union", "parity"}));
     add_mesh_options(verb);
+}
+
+CloseSettings SolidOptions::close_settings() const {
+    return taihu::close_settings(close.value_or("loops"), shells.value_or("union"));
 }
 
 MeshReadSettings SolidOptions::mesh_settings() const {
@@ -68,8 +85,8 @@ Solid read_solid(const SolidOptions& options, const Console& console) {
             throw Error(Fault::bad_argument,
                         where +
                             ": a level set keeps its own voxels and units; drop --dim, --voxel, "
-                            "--close, --unit and --up, or voxelize the mesh again");
-        VdbFile file = read_vdb(options.path);
+                            "--close, --shells, --unit and --up, or voxelize the mesh again");
+        VdbFile file = read_solid_vdb(options.path);
         solid.grid = file.solid;
         const auto made = recipe_solid(file.recipe);
         solid.node = made ? *made : level_set_node(name, sha256_hex(read_file(options.path)));
@@ -77,8 +94,7 @@ Solid read_solid(const SolidOptions& options, const Console& console) {
         const MeshFile file = read_mesh(options.path, options.mesh_settings(), console.progress);
         const TriMesh& mesh = file.levels.front();
         VoxelizeSettings settings;
-        settings.close =
-            options.close.value_or("loops") == "none" ? CloseRule::none : CloseRule::loops;
+        settings.close = options.close_settings();
         const Box box = bounds(mesh);
         settings.voxel_m = options.voxel.empty()
                                ? voxel_for(box, options.dim.value_or(kDefaultDim))
@@ -86,7 +102,7 @@ Solid read_solid(const SolidOptions& options, const Console& console) {
         report_stage(console.progress, "voxelizing");
         VoxelizeResult result = voxelize(mesh, where, settings, console.progress);
         solid.grid = result.solid;
-        solid.found = result.diagnosis.lines();
+        solid.found = result.diagnosis.lines(settings.voxel_m);
         if (file.n_polygons > 0)
             solid.found.push_back(
                 fmt::format("{} polygons of more than three corners split", file.n_polygons));
@@ -97,7 +113,7 @@ Solid read_solid(const SolidOptions& options, const Console& console) {
             solid.found.push_back(fmt::format("the finest of {} levels taken", file.levels.size()));
         console.say_all(where, solid.found);
         solid.node = mesh_node(name, sha256_hex(read_file(options.path)),
-                               options.mesh_settings().unit_m, options.z_up());
+                               options.mesh_settings().unit_m, options.z_up(), settings.close);
     }
     solid.measure = {lattice_of(*solid.grid).voxel_m, longest_m(*solid.grid)};
     return solid;

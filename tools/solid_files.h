@@ -12,23 +12,26 @@
 #include "mesh_out/surface_file.h"
 #include "tools/console.h"
 #include "tools/units.h"
+#include "vdb_ops/mesh_diagnosis.h"
 
 namespace taihu {
 
 /// The options by which a verb takes a solid: a level set, or a mesh that becomes one.
 struct SolidOptions {
     std::filesystem::path path;
-    std::optional<int> dim;           ///< voxels along the longest axis
-    std::string voxel;                ///< or their size
-    std::optional<std::string> close; ///< loops, none
+    std::optional<int> dim;            ///< voxels along the longest axis
+    std::string voxel;                 ///< or their size
+    std::optional<std::string> close;  ///< loops, winding, plane, none
+    std::optional<std::string> shells; ///< union, parity
     std::optional<double> unit_m;
     std::optional<std::string> up; ///< y, z
 
     void add_mesh_options(CLI::App& verb);  ///< --unit, --up
-    void add_voxel_options(CLI::App& verb); ///< --dim, --voxel, --close, and the two above
+    void add_voxel_options(CLI::App& verb); ///< --dim, --voxel, --close, --shells, and these
     MeshReadSettings mesh_settings() const;
     bool z_up() const { return up.value_or("y") == "z"; }
-    bool any_mesh_option() const { return close || unit_m || up; }
+    CloseSettings close_settings() const;
+    bool any_mesh_option() const { return close || shells || unit_m || up; }
 };
 
 struct Solid {
@@ -49,6 +52,7 @@ struct SurfaceOptions {
     bool uniform = false, no_draco = false;
     std::optional<std::string> max_error;
     void add_options(CLI::App& verb);
+    bool any() const { return uniform || no_draco || max_error; }
     /// \throws Error bad_argument: an option that has no meaning for this output.
     void check(const std::filesystem::path& out) const;
     SurfaceSettings settings(const Measure& measure) const;

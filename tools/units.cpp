@@ -58,6 +58,21 @@ double angle_deg(const std::string& option, const std::string& text) {
                 option + ": '" + printable(text) + "' is no angle; write 25deg");
 }
 
+double memory_bytes(const std::string& option, const std::string& text) {
+    std::size_t end = text.size();
+    while (end > 0 && std::isalpha(static_cast<unsigned char>(text[end - 1])))
+        --end;
+    const auto value = parse_number(std::string_view(text).substr(0, end));
+    const std::string_view unit = std::string_view(text).substr(end);
+    static constexpr std::array<std::pair<std::string_view, double>, 5> kUnits = {
+        {{"", 1}, {"kB", 1e3}, {"MB", 1e6}, {"GB", 1e9}, {"TB", 1e12}}};
+    for (const auto& [name, bytes] : kUnits)
+        if (value && *value > 0 && unit == name)
+            return *value * bytes;
+    throw Error(Fault::bad_argument, option + ": '" + printable(text) +
+                                         "' is no amount of memory > 0; write 4GB or 500MB");
+}
+
 Vec3 parse_size(const std::string& option, const std::string& text) {
     std::vector<double> parts;
     for (std::size_t at = 0; at <= text.size();) {

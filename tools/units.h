@@ -32,6 +32,9 @@ double length_m(const std::string& option, const std::string& text, const Measur
 /// \throws Error bad_argument: no number, another unit.
 double angle_deg(const std::string& option, const std::string& text);
 
+/// An amount of memory as people type it: `4GB`, `500MB`, or a number of bytes.
+double memory_bytes(const std::string& option, const std::string& text);
+
 /// `X`, or `X,Y,Z`, of lengths in metres; one number stands for all three.
 Vec3 parse_size(const std::string& option, const std::string& text);
 

@@ -33,7 +33,9 @@ void add_voxelize(CLI::App& app, Console& console) {
     auto* verb =
         console.verb(app, "voxelize", "Turn a mesh into a level set, closing it if it is open",
                      "  taihu voxelize scan.ply --dim 400 -o base.vdb\n"
-                     "  taihu voxelize part.stl --unit 0.001 --up z --voxel 0.5mm -o part.vdb");
+                     "  taihu voxelize part.stl --unit mm --up z --voxel 0.5mm -o part.vdb\n"
+                     "  taihu voxelize terrain.obj --close plane -o pedestal.vdb\n"
+                     "  taihu voxelize torn.ply --close winding -o whole.vdb");
     verb->add_option("mesh", args->mesh.path, "Mesh to read (.obj .ply .stl .off .glb .drc)")
         ->required();
     verb->add_option("-o,--output", args->out, "Where to write the level set (.vdb)")->required();

@@ -1,179 +1,82 @@
 #include "vdb_ops/clean.h"
 
-#include <algorithm>
-#include <array>
 #include <cmath>
-#include <memory>
-#include <vector>
-
-#include <openvdb/tools/SignedFloodFill.h>
-#include <tbb/parallel_for.h>
 
 #include "stats/core/error.h"
-#include "vdb_ops/components_detail.h"
+#include "stats/number_detail.h"
+#include "vdb_ops/flips_detail.h"
+#include "vdb_ops/necks_detail.h"
 #include "vdb_ops/rasterize.h"
 #include "vdb_ops/volume.h"
 
 namespace taihu {
+
+std::string foot_line(const CleanCounts& counts) {
+    const Foot& foot = *counts.foot;
+    return "stands tilted by up to " + rounded(foot.tilt_deg) + " degrees: " +
+           (foot.cut_m > 0 ? rounded(foot.cut_m) + " m cut off below (" + rounded(counts.foot_m3) +
+                                 " m^3), a foot of "
+                           : "nothing to cut, a foot of ") +
+           rounded(foot.contact_m2) + " m^2";
+}
+
+std::vector<std::string> cleaning_lines(const CleanCounts& counts) {
+    std::vector<std::string> lines;
+    if (counts.n_necked > 0)
+        lines.push_back(std::to_string(counts.n_necked) + " parts on thin necks cut off (" +
+                        rounded(counts.necked_m3) + " m^3)");
+    if (counts.n_pieces_removed + counts.n_bubbles_filled > 0)
+        lines.push_back(
+            std::to_string(counts.n_pieces_removed) + " of " + std::to_string(counts.n_pieces) +
+            " pieces removed (" + rounded(counts.removed_m3) + " m^3), " +
+            std::to_string(counts.n_bubbles_filled) + " of " + std::to_string(counts.n_bubbles) +
+            " sealed bubbles filled (" + rounded(counts.filled_m3) + " m^3)");
+    if (counts.foot)
+        lines.push_back(foot_line(counts));
+    return lines;
+}
+
+void check_clean_settings(const CleanSettings& settings) {
+    if (!(settings.min_neck_m >= 0) || !std::isfinite(settings.min_neck_m))
+        throw Error(Fault::bad_argument,
+                    "clean: min_neck_m is " + shortest(settings.min_neck_m) + ", must be >= 0");
+    if (settings.min_neck_m > 0 && !settings.n_pieces)
+        throw Error(Fault::bad_argument, "clean: thin necks are cut to drop what hangs on them; "
+                                         "say how many pieces stay, not all");
+    if (!(settings.foot_deg >= 0 && settings.foot_deg <= 60))
+        throw Error(Fault::bad_argument,
+                    "clean: foot_deg is " + shortest(settings.foot_deg) + ", must be 0..60");
+}
+
 namespace {
 
-using openvdb::Coord;
-using Leaf = openvdb::FloatTree::LeafNodeType;
-
-/// Which parts change side.
-struct Choice {
-    std::vector<char> flips; // by part
-    CleanResult counts;
-};
-
-Choice choose(const std::vector<Components::Part>& parts, const CleanSettings& settings) {
-    Choice choice;
-    choice.flips.assign(parts.size(), 0);
-    std::vector<std::size_t> solids;
-    for (std::size_t p = 0; p < parts.size(); ++p)
-        if (parts[p].solid)
-            solids.push_back(p);
-    if (solids.empty())
-        throw Error(Fault::bad_input,
-                    "clean: nothing is left of the solid; use fewer or smaller holes");
-    std::sort(solids.begin(), solids.end(), [&](std::size_t a, std::size_t b) {
-        return parts[a].n_voxels != parts[b].n_voxels ? parts[a].n_voxels > parts[b].n_voxels
-                                                      : parts[a].first < parts[b].first;
-    });
-    choice.counts.n_pieces = solids.size();
-    for (std::size_t i = settings.n_pieces.value_or(solids.size()); i < solids.size(); ++i) {
-        choice.flips[solids[i]] = 1;
-        ++choice.counts.n_pieces_removed;
-    }
-    return choice;
-}
-
-/// A leaf and its surroundings after the choice, as far as the band reaches.
-class Neighbourhood {
-public:
-    Neighbourhood(const openvdb::FloatGrid::ConstAccessor& accessor, const Components& components,
-                  const std::vector<char>& flips, const Coord& leaf, int reach)
-        : reach_(reach), size_(8 + 2 * reach) {
-        const auto n = static_cast<std::size_t>(size_);
-        old_.reserve(n * n * n);
-        for (int x = 0; x < size_; ++x)
-            for (int y = 0; y < size_; ++y)
-                for (int z = 0; z < size_; ++z) {
-                    const Coord c = leaf.offsetBy(x - reach, y - reach, z - reach);
-                    old_.push_back(accessor.getValue(c));
-                    flipped_.push_back(flips[components.part(c)]);
-                    any_flipped_ |= flipped_.back() != 0;
-                }
-        if (any_flipped_)
-            find_crossings();
-    }
-
-    bool any_flipped() const { return any_flipped_; }
-    float old(int x, int y, int z) const { return old_[index(x + reach_, y + reach_, z + reach_)]; }
-    bool flipped(int x, int y, int z) const {
-        return flipped_[index(x + reach_, y + reach_, z + reach_)] != 0;
-    }
-    /// Distance [voxels] from a voxel of the leaf to the nearest place where a grid edge crosses
-    /// the surface that stays, or the one that goes; at most `far`.
-    float to_staying(int x, int y, int z, float far) const {
-        return nearest(staying_, x, y, z, far);
-    }
-    float to_going(int x, int y, int z, float far) const { return nearest(going_, x, y, z, far); }
-
-private:
-    using Points = std::vector<std::array<float, 3>>;
-    static float nearest(const Points& points, int x, int y, int z, float far) {
-        float best2 = far * far;
-        for (const auto& c : points) {
-            const float dx = c[0] - static_cast<float>(x), dy = c[1] - static_cast<float>(y),
-                        dz = c[2] - static_cast<float>(z);
-            best2 = std::min(best2, dx * dx + dy * dy + dz * dz);
-        }
-        return std::sqrt(best2);
-    }
-    std::size_t index(int x, int y, int z) const {
-        return static_cast<std::size_t>((x * size_ + y) * size_ + z);
-    }
-    void find_crossings() {
-        const std::size_t strides[3] = {index(1, 0, 0), index(0, 1, 0), 1};
-        for (int x = 0; x < size_; ++x)
-            for (int y = 0; y < size_; ++y)
-                for (int z = 0; z < size_; ++z) {
-                    const int at[3] = {x, y, z};
-                    const std::size_t p = index(x, y, z);
-                    for (std::size_t axis = 0; axis < 3; ++axis) {
-                        if (at[axis] + 1 == size_)
-                            continue;
-                        const std::size_t q = p + strides[axis];
-                        if ((old_[p] < 0) == (old_[q] < 0))
-                            continue;
-                        std::array<float, 3> point = {static_cast<float>(x - reach_),
-                                                      static_cast<float>(y - reach_),
-                                                      static_cast<float>(z - reach_)};
-                        point[axis] += old_[p] / (old_[p] - old_[q]);
-                        (flipped_[p] || flipped_[q] ? going_ : staying_).push_back(point);
-                    }
-                }
-    }
-
-    int reach_, size_;
-    bool any_flipped_ = false;
-    std::vector<float> old_;
-    std::vector<char> flipped_;
-    Points staying_, going_; // in voxels from the leaf's first
-};
-
-/// Rebuild the values of one leaf whose surroundings changed.
-void rebuild_leaf(Leaf& leaf, const Neighbourhood& near, float half_width, float voxel) {
-    const float background = half_width * voxel;
-    for (int v = 0; v < 512; ++v) {
-        const int x = v / 64, y = v / 8 % 8, z = v % 8;
-        const float old = near.old(x, y, z);
-        const bool flipped = near.flipped(x, y, z);
-        if (!flipped && std::fabs(old) >= background)
-            continue;
-        // Looked for a voxel beyond the band: crossings of edges are a little farther than the
-        // surface.
-        const float d = near.to_staying(x, y, z, half_width + 1);
-        // The nearest surface stays: its exact distance is better than the one rebuilt.
-        if (!flipped && near.to_going(x, y, z, half_width + 1) >= d)
-            continue;
-        const float value = std::min(d * voxel, background);
-        const auto offset = static_cast<openvdb::Index>(v);
-        leaf.setValueOnly(offset, (old < 0) != flipped ? -value : value);
-        leaf.setActiveState(offset, value < background);
-    }
-}
-
-/// The grid with the chosen parts on the other side. Only leaves near them are touched.
-openvdb::FloatGrid::Ptr flip_parts(const openvdb::FloatGrid& grid, const Components& components,
-                                   const std::vector<char>& flips, Progress* progress) {
-    const Lattice lattice = lattice_of(grid);
-    const auto& old = components.leaves();
-    const std::vector<char> changing = components.blocks_with(flips);
-    std::vector<std::unique_ptr<Leaf>> leaves(old.size());
-    tbb::parallel_for(std::size_t{0}, old.size(), [&](std::size_t i) {
-        check_cancelled(progress);
-        leaves[i] = std::make_unique<Leaf>(*old[i]);
-        if (!components.near_any(old[i]->origin(), changing))
+/// Cut until what is left stands: what a cut sets free moves the centre of mass.
+void stand(CleanResult& result, const CleanSettings& settings, Progress* progress) {
+    constexpr int kMostCuts = 16;
+    CleanSettings rest = settings;
+    rest.min_neck_m = rest.foot_deg = 0;
+    double cut_m = 0; // of the cuts before
+    for (int i = 0; i < kMostCuts; ++i) {
+        report_stage(progress, "looking for a foot");
+        result.foot = find_foot(*result.solid, settings.foot_deg);
+        if (!result.foot)
+            break;
+        const bool stands = result.foot->cut_m == 0;
+        cut_m = result.foot->cut_m += cut_m;
+        if (stands)
             return;
-        const auto accessor = grid.getConstAccessor();
-        const Neighbourhood near(accessor, components, flips, old[i]->origin(),
-                                 static_cast<int>(std::ceil(lattice.half_width_vox)) + 2);
-        if (near.any_flipped())
-            rebuild_leaf(*leaves[i], near, lattice.half_width_vox,
-                         static_cast<float>(lattice.voxel_m));
-    });
-    auto result = openvdb::FloatGrid::create(grid.background());
-    result->setTransform(grid.transform().copy());
-    result->setGridClass(openvdb::GRID_LEVEL_SET);
-    auto accessor = result->getAccessor();
-    for (auto& leaf : leaves)
-        if (!leaf->isEmpty())
-            accessor.addLeaf(leaf.release());
-    // A new tree: tiles take the side of the leaves that are left, whatever was there before.
-    openvdb::tools::signedFloodFill(result->tree(), true, 1, 1);
-    return result;
+        const auto cut = cut_below(*result.solid, result.foot->y_m);
+        result.foot_m3 += volume_m3(*result.solid) - volume_m3(*cut);
+        const CleanResult again = clean(*cut, rest, progress);
+        result.n_pieces_removed += again.n_pieces_removed;
+        result.removed_m3 += again.removed_m3;
+        result.n_bubbles_filled += again.n_bubbles_filled;
+        result.filled_m3 += again.filled_m3;
+        result.solid = again.solid;
+    }
+    throw Error(Fault::numeric, "clean: the solid stands tilted by " + shortest(settings.foot_deg) +
+                                    " degrees on no cut below half its height; ask for less, or "
+                                    "turn it");
 }
 
 } // namespace
@@ -181,34 +84,57 @@ openvdb::FloatGrid::Ptr flip_parts(const openvdb::FloatGrid& grid, const Compone
 CleanResult clean(const openvdb::FloatGrid& solid, const CleanSettings& settings,
                   Progress* progress) {
     lattice_of(solid);
-    if (solid.tree().leafCount() == 0)
+    check_clean_settings(settings);
+    if (settings.foot_deg > 0) {
+        CleanSettings rest = settings;
+        rest.foot_deg = 0;
+        CleanResult result = clean(solid, rest, progress);
+        stand(result, settings, progress);
+        return result;
+    }
+    if (settings.min_neck_m > 0) {
+        CleanSettings rest = settings;
+        rest.min_neck_m = 0;
+        const Necked necked = find_necked(solid, settings.min_neck_m, *settings.n_pieces, progress);
+        if (necked.n_pieces > 0)
+            rest.n_pieces = necked.n_pieces;
+        if (necked.n_parts == 0)
+            return clean(solid, rest, progress);
+        const auto cut =
+            flip(solid, necked.voxels, openvdb::CoordBBox::inf(), progress, Flipped::cut);
+        CleanResult result = clean(*cut, rest, progress);
+        result.n_necked = necked.n_parts;
+        result.necked_m3 = volume_m3(solid) - volume_m3(*cut);
+        return result;
+    }
+    openvdb::CoordBBox box;
+    if (!solid.tree().evalLeafBoundingBox(box))
         throw Error(Fault::bad_input,
                     "clean: nothing is left of the solid; use fewer or smaller holes");
     CleanResult result;
-    openvdb::FloatGrid::Ptr grid;
+    openvdb::MaskTree removed, filled;
     {
-        const Components components(solid);
-        const Choice choice = choose(components.parts(), settings);
-        result = choice.counts;
-        grid = choice.counts.n_pieces_removed > 0
-                   ? flip_parts(solid, components, choice.flips, progress)
-                   : solid.deepCopy();
+        const Components components(solid, box, box);
+        const CleanChoice choice =
+            choose_parts(components.parts(), components.contacts(), settings);
+        static_cast<CleanCounts&>(result) = choice.counts;
+        components.mark(choice.removed, removed);
+        components.mark(choice.filled, filled);
     }
-    const double before = volume_m3(solid), without_pieces = volume_m3(*grid);
-    result.removed_m3 = before - without_pieces;
-    // After the pieces: a bubble inside a removed piece went with it, one around it is whole now.
-    const Components components(*grid);
-    std::vector<char> flips(components.parts().size(), 0);
-    for (std::size_t p = 0; p < flips.size(); ++p) {
-        flips[p] = !components.parts()[p].solid && !components.parts()[p].outside;
-        result.n_bubbles += flips[p] != 0;
+    const auto everywhere = openvdb::CoordBBox::inf();
+    const double before_m3 = volume_m3(solid);
+    double now_m3 = before_m3;
+    if (result.n_pieces_removed > 0) {
+        result.solid = flip(solid, removed, everywhere, progress);
+        now_m3 = volume_m3(*result.solid);
+        result.removed_m3 = before_m3 - now_m3;
     }
-    if (settings.fill_bubbles && result.n_bubbles > 0) {
-        result.n_bubbles_filled = result.n_bubbles;
-        grid = flip_parts(*grid, components, flips, progress);
-        result.filled_m3 = volume_m3(*grid) - without_pieces;
+    if (result.n_bubbles_filled > 0) {
+        result.solid = flip(result.solid ? *result.solid : solid, filled, everywhere, progress);
+        result.filled_m3 = volume_m3(*result.solid) - now_m3;
     }
-    result.solid = grid;
+    if (!result.solid)
+        result.solid = solid.deepCopy();
     return result;
 }
 

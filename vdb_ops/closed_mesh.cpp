@@ -7,17 +7,18 @@
 #include <numeric>
 
 #include "stats/core/error.h"
+#include "vdb_ops/columns_detail.h"
 
 namespace taihu {
 namespace {
 
 using Index = std::uint32_t;
-constexpr Index kNone = ~Index{0};
 
 /// Shells of a repaired mesh: their measures and roles.
 class Shells {
 public:
-    explicit Shells(RepairedMesh mesh) : faces_(std::move(mesh.triangles)) {
+    Shells(RepairedMesh mesh, ShellRule rule) : faces_(std::move(mesh.triangles)) {
+        out_.rule = rule;
         out_.positions = std::move(mesh.positions);
         out_.shell_of = std::move(mesh.shell_of);
         out_.diagnosis = std::move(mesh.diagnosis);
@@ -27,6 +28,9 @@ public:
 
     ClosedMesh run() {
         measure_shells();
+        find_sheets();
+        renumber_by_volume();
+        sort_faces();
         assign_roles();
         collect();
         return std::move(out_);
@@ -53,9 +57,7 @@ private:
     /// Winding number of a shell about `p`: sum of solid angles (Van Oosterom & Strackee 1983).
     double winding(Index shell, const Vec3& p) const {
         double sum = 0;
-        for (std::size_t f = 0; f < faces_.size(); ++f) {
-            if (out_.shell_of[f] != shell)
-                continue;
+        for (std::size_t f = first_[shell]; f < first_[shell + 1]; ++f) {
             const Vec3 a = out_.positions[faces_[f][0]] - p, b = out_.positions[faces_[f][1]] - p,
                        c = out_.positions[faces_[f][2]] - p;
             const double la = length(a), lb = length(b), lc = length(c);
@@ -65,31 +67,42 @@ private:
         return sum / (4 * std::numbers::pi);
     }
 
-    void assign_roles() {
-        // Caps as large as the shell itself, or nothing held: no inside.
+    /// Caps as large as the shell itself, or nothing held: no inside.
+    void find_sheets() {
+        const bool caps_count = out_.diagnosis.rule != CloseRule::plane;
         for (Shell& s : out_.shells)
-            if (s.cap_area_m2 > 0.45 * s.area_m2 ||
+            if ((caps_count && s.cap_area_m2 > 0.45 * s.area_m2) ||
                 36 * std::numbers::pi * s.volume_m3 * s.volume_m3 <=
                     1e-12 * s.area_m2 * s.area_m2 * s.area_m2)
                 s.role = Shell::Role::sheet;
-        renumber_by_volume();
-        std::vector<Index> first_face(out_.shells.size(), kNone);
-        for (Index f = static_cast<Index>(faces_.size()); f-- > 0;)
-            first_face[out_.shell_of[f]] = f;
+    }
+
+    bool holds(Index outer, Index inner) const {
+        const Shell &a = out_.shells[outer], &b = out_.shells[inner];
+        return a.role != Shell::Role::sheet && a.box.contains(b.box.lo) &&
+               a.box.contains(b.box.hi) &&
+               std::fabs(winding(outer, out_.positions[faces_[first_[inner]][0]])) > 0.5;
+    }
+
+    void assign_roles() {
         // Larger shells come first, so the last one that holds a shell is the innermost.
         for (Index i = 0; i < out_.shells.size(); ++i) {
             Shell& inner = out_.shells[i];
+            bool cavity = false;
             for (Index j = i; inner.role == Shell::Role::solid && j-- > 0;) {
-                const Shell& outer = out_.shells[j];
-                if (outer.role == Shell::Role::sheet || !outer.box.contains(inner.box.lo) ||
-                    !outer.box.contains(inner.box.hi) ||
-                    std::fabs(winding(j, out_.positions[faces_[first_face[i]][0]])) <= 0.5)
+                if (!holds(j, i))
                     continue;
+                const Shell& outer = out_.shells[j];
+                if (out_.rule == ShellRule::parity) {
+                    cavity = !cavity;
+                    continue;
+                }
                 const bool turned = (inner.volume_m3 < 0) != (outer.volume_m3 < 0);
-                if (turned && outer.role == Shell::Role::solid)
-                    inner.role = Shell::Role::cavity;
+                cavity = turned && outer.role == Shell::Role::solid;
                 break;
             }
+            if (cavity)
+                inner.role = Shell::Role::cavity;
         }
     }
 
@@ -109,7 +122,25 @@ private:
             s = number[s];
     }
 
-    /// Faces sorted by shell, sheets left out; totals of the diagnosis.
+    void sort_faces() {
+        std::vector<Index> order(faces_.size());
+        std::iota(order.begin(), order.end(), Index{0});
+        std::stable_sort(order.begin(), order.end(),
+                         [&](Index a, Index b) { return out_.shell_of[a] < out_.shell_of[b]; });
+        std::vector<Triangle> faces;
+        std::vector<Index> shell_of;
+        first_.assign(out_.shells.size() + 1, 0);
+        for (const Index f : order) {
+            faces.push_back(faces_[f]);
+            shell_of.push_back(out_.shell_of[f]);
+            ++first_[shell_of.back() + 1];
+        }
+        std::partial_sum(first_.begin(), first_.end(), first_.begin());
+        faces_ = std::move(faces);
+        out_.shell_of = std::move(shell_of);
+    }
+
+    /// Sheets left out; totals of the diagnosis.
     void collect() {
         MeshDiagnosis& d = out_.diagnosis;
         for (const Shell& s : out_.shells) {
@@ -117,62 +148,98 @@ private:
             d.cap_area_m2 += s.cap_area_m2;
             d.n_solids += s.role == Shell::Role::solid;
             d.n_cavities += s.role == Shell::Role::cavity;
+            if (s.role == Shell::Role::solid)
+                d.thickness_m.push_back(2 * std::fabs(s.volume_m3) / s.area_m2);
             d.n_inverted += s.role == Shell::Role::solid && s.volume_m3 < 0;
             if (s.role == Shell::Role::sheet) {
                 ++d.n_sheets;
                 d.sheet_area_m2 += s.area_m2 - s.cap_area_m2;
             }
         }
-        std::vector<Index> order;
-        for (Index f = 0; f < faces_.size(); ++f)
-            if (out_.shells[out_.shell_of[f]].role != Shell::Role::sheet)
-                order.push_back(f);
-        std::stable_sort(order.begin(), order.end(),
-                         [&](Index a, Index b) { return out_.shell_of[a] < out_.shell_of[b]; });
         std::vector<Index> shell_of;
-        for (const Index f : order) {
-            out_.triangles.push_back(faces_[f]);
-            shell_of.push_back(out_.shell_of[f]);
-        }
+        for (Index f = 0; f < faces_.size(); ++f)
+            if (out_.shells[out_.shell_of[f]].role != Shell::Role::sheet) {
+                out_.triangles.push_back(faces_[f]);
+                shell_of.push_back(out_.shell_of[f]);
+            }
         out_.shell_of = std::move(shell_of);
+        find_overlaps();
+    }
+
+    /// Shells that cross themselves, as a coarse set of columns sees it.
+    void find_overlaps() {
+        constexpr double kColumns = 64; // along the longest axis
+        const Box box = bounds({out_.positions, out_.triangles, {}});
+        if (!(box.longest() > 0))
+            return;
+        std::vector<Vec3> points(out_.positions.size());
+        for (std::size_t i = 0; i < points.size(); ++i) // caps of sheets may lie outside
+            points[i] =
+                (min(max(out_.positions[i], box.lo), box.hi) - box.lo) * (kColumns / box.longest());
+        const Columns columns(out_, points,
+                              openvdb::CoordBBox(openvdb::Coord(-1), openvdb::Coord(66)));
+        for (Index s = 0; s < out_.shells.size(); ++s)
+            out_.diagnosis.n_overlapping +=
+                out_.shells[s].role != Shell::Role::sheet && columns.overlaps_itself(s);
     }
 
     ClosedMesh out_;
     std::vector<Triangle> faces_;
+    std::vector<std::size_t> first_; ///< faces of shell s: faces_[first_[s] .. first_[s + 1])
 };
+
+std::string counted(std::size_t n, const char* what) {
+    return std::to_string(n) + " " + what + (n == 1 ? "" : "s");
+}
+
+[[noreturn]] void refuse_open(const TriMesh& mesh, const std::string& where,
+                              const MeshDiagnosis& d) {
+    const auto loops = repair_mesh(mesh, 0, CloseRule::loops).diagnosis.loops.size();
+    throw Error(Fault::bad_input, where + ": open: " + std::to_string(d.n_open_edges) +
+                                      " open edges in " + std::to_string(loops) +
+                                      " loops; close them, or cap them with --close loops");
+}
+
+[[noreturn]] void refuse_flat(const std::string& where, const MeshDiagnosis& d) {
+    std::string what;
+    if (d.n_faces == 0)
+        what = "it has no face; export it with its faces";
+    else if (d.n_sheets == 0)
+        what = "none of its " + counted(d.n_faces, "face") +
+               " has three corners that are there, finite and different; export it again";
+    else if (d.rule == CloseRule::plane || d.n_open_edges == 0)
+        what = counted(d.n_sheets, "sheet") + " without volume; give the mesh a thickness";
+    else {
+        char share[32];
+        std::snprintf(share, sizeof share, "%.0f", 100 * d.cap_area_m2 / d.area_m2);
+        what = counted(d.n_sheets, "open sheet") + " (caps would be " + share +
+               " % of the surface); give the mesh a thickness, or try --close plane, which puts a "
+               "base under it, or --close winding";
+    }
+    throw Error(Fault::bad_input, where + ": no inside: " + what);
+}
 
 } // namespace
 
-ClosedMesh close_mesh(const TriMesh& mesh, const std::string& where, CloseRule rule,
+ClosedMesh close_mesh(const TriMesh& mesh, const std::string& where, const CloseSettings& settings,
                       Progress* progress) {
-    Box box;
-    for (const Vec3& p : mesh.positions)
-        if (is_finite(p))
-            box.include(p);
-    const double diagonal = length(box.size());
-    ClosedMesh closed;
-    for (const double tolerance : {0.0, 1e-6, 1e-5, 1e-4}) {
-        check_cancelled(progress);
-        closed = Shells(repair_mesh(mesh, tolerance * diagonal, rule)).run();
+    if (settings.rule == CloseRule::winding)
+        throw Error(Fault::bad_argument,
+                    where + ": 'winding' makes no closed mesh; use loops, plane or none");
+    RepairedMesh repaired = repair_mesh(mesh, std::nullopt, settings.rule);
+    const double share = repaired.diagnosis.weld_share;
+    ClosedMesh closed = Shells(std::move(repaired), settings.shells).run();
+    for (const double wider : weld_shares()) {
         if (closed.diagnosis.n_solids > 0 || closed.diagnosis.n_open_edges == 0)
             break;
+        check_cancelled(progress);
+        if (wider > share)
+            closed = Shells(repair_mesh(mesh, wider, settings.rule), settings.shells).run();
     }
-    const MeshDiagnosis& d = closed.diagnosis;
-    if (rule == CloseRule::none && d.n_open_edges > 0) {
-        const auto loops = repair_mesh(mesh, 0, CloseRule::loops).diagnosis.loops.size();
-        throw Error(Fault::bad_input, where + ": open: " + std::to_string(d.n_open_edges) +
-                                          " open edges in " + std::to_string(loops) +
-                                          " loops; close them, or cap them with --close loops");
-    }
-    if (d.n_solids == 0) {
-        char share[32];
-        std::snprintf(share, sizeof share, "%.0f",
-                      d.area_m2 > 0 ? 100 * d.cap_area_m2 / d.area_m2 : 0);
-        throw Error(Fault::bad_input,
-                    where + ": no inside: " + std::to_string(d.n_sheets) +
-                        " sheets without one (caps would be " + share +
-                        " % of the surface); give the mesh a thickness or a closed surface");
-    }
+    if (settings.rule == CloseRule::none && closed.diagnosis.n_open_edges > 0)
+        refuse_open(mesh, where, closed.diagnosis);
+    if (closed.diagnosis.n_solids == 0)
+        refuse_flat(where, closed.diagnosis);
     return closed;
 }
 

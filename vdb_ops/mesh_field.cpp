@@ -11,7 +11,7 @@
 #include "stats/core/error.h"
 #include "vdb_ops/columns_detail.h"
 #include "vdb_ops/kernels_detail.h"
-#include "vdb_ops/rounding_detail.h"
+#include "vdb_ops/mesh_cells_detail.h"
 
 namespace taihu {
 namespace {
@@ -22,88 +22,6 @@ constexpr int kBlock = BlockSampler::kBlock;
 constexpr int kLeaf = BlockSampler::kLeaf;
 constexpr int kAcross = kBlock / kLeaf;
 constexpr std::size_t kLeaves = std::size_t{kAcross} * kAcross * kAcross;
-
-/// Face `face` of a closed mesh. Each edge is passed as often from its lower vertex to its higher
-/// one as back, so one direction is enough to measure the distance to it; with the lowest vertex
-/// first these are the first edge, and the second one or not.
-LeafTriangle leaf_triangle(Triangle face, const std::vector<Vec3>& points, std::uint32_t shell,
-                           float half_width) {
-    std::rotate(face.begin(), std::min_element(face.begin(), face.end()), face.end());
-    const std::array<Vec3, 3> p = {points[face[0]], points[face[1]], points[face[2]]};
-    LeafTriangle t;
-    t.shell = shell;
-    t.n_edges = face[1] < face[2] ? 2 : 1;
-    const std::array<Vec3, 3> e = {p[1] - p[0], p[2] - p[1], p[0] - p[2]};
-    Vec3 n = cross(e[0], e[1]);
-    const double longest2 =
-        std::max({length_squared(e[0]), length_squared(e[1]), length_squared(e[2])});
-    // A needle has no normal worth the name: its edges are all of it.
-    n = length_squared(n) <= 1e-14 * longest2 * longest2 ? Vec3{} : normalized(n);
-    for (std::size_t k = 0; k < 3; ++k) {
-        const Vec3 en = cross(n, e[k]);
-        const double e2 = length_squared(e[k]);
-        t.inverse_e2[k] = e2 > 0 ? static_cast<float>(1 / e2) : 0.f;
-        for (int c = 0; c < 3; ++c) {
-            t.e[k][c] = static_cast<float>(e[k][c]);
-            t.en[k][c] = static_cast<float>(en[c]);
-        }
-    }
-    for (int c = 0; c < 3; ++c) {
-        for (std::size_t k = 0; k < 3; ++k)
-            t.corner[k][c] = p[k][c];
-        t.n[c] = n[c];
-        // Rounded away from the face, so that a cell is never missed.
-        constexpr float kFar = std::numeric_limits<float>::infinity();
-        t.lo[c] = std::nextafter(static_cast<float>(std::min({p[0][c], p[1][c], p[2][c]})), -kFar) -
-                  half_width;
-        t.hi[c] = std::nextafter(static_cast<float>(std::max({p[0][c], p[1][c], p[2][c]})), kFar) +
-                  half_width;
-    }
-    return t;
-}
-
-/// Calls fn(i, j, k) for the cells of `size` voxels, numbered from `first` over n cells each way,
-/// that may hold a voxel within the half width of the face: its box, and the slab round its plane.
-template <class Fn>
-void each_cell(const LeafTriangle& t, int size, const Coord& first, const Coord& n,
-               float half_width, Fn&& fn) {
-    int lo[3], hi[3];
-    for (int c = 0; c < 3; ++c) {
-        lo[c] = std::max(0, floor_int(ceil_int(t.lo[c]) / double(size)) - first[c]);
-        hi[c] = std::min(n[c] - 1, floor_int(floor_int(t.hi[c]) / double(size)) - first[c]);
-    }
-    // Linear in the middle of a cell, and small enough where the cell may come near the face: the
-    // distance to its plane, both ways, and that beyond each edge in the plane (long thin faces
-    // would fill their box otherwise).
-    const double half = 0.5 * (size - 1);
-    const double reach =
-        half * (std::fabs(t.n[0]) + std::fabs(t.n[1]) + std::fabs(t.n[2])) + half_width + 1e-3;
-    // Normals of edges are floats: off by 1e-7 of the face's extent.
-    const double extent = std::max({t.hi[0] - t.lo[0], t.hi[1] - t.lo[1], t.hi[2] - t.lo[2]});
-    const double edge_reach = std::sqrt(3.0) * half + half_width + 0.01 + 1e-6 * extent;
-    double edge_limit[3], from[3][3]; // corners from the middle of the first cell
-    for (std::size_t e = 0; e < 3; ++e) {
-        edge_limit[e] = -edge_reach / std::sqrt(static_cast<double>(t.inverse_e2[e]));
-        for (int c = 0; c < 3; ++c)
-            from[e][c] = first[c] * static_cast<double>(size) + half - t.corner[e][c];
-    }
-    const auto near = [&](double x, double y, double z) {
-        if (std::fabs(t.n[0] * (x + from[0][0]) + t.n[1] * (y + from[0][1]) +
-                      t.n[2] * (z + from[0][2])) > reach)
-            return false;
-        for (std::size_t e = 0; e < 3; ++e)
-            if (t.en[e][0] * (x + from[e][0]) + t.en[e][1] * (y + from[e][1]) +
-                    t.en[e][2] * (z + from[e][2]) <
-                edge_limit[e])
-                return false;
-        return true;
-    };
-    for (int i = lo[0]; i <= hi[0]; ++i)
-        for (int j = lo[1]; j <= hi[1]; ++j)
-            for (int k = lo[2]; k <= hi[2]; ++k)
-                if (near(i * size, j * size, k * size))
-                    fn(i, j, k);
-}
 
 /// Everything about a mesh on a lattice that blocks share.
 struct LatticeMeshData {
@@ -118,7 +36,8 @@ struct LatticeMeshData {
         bool in = false; // from the largest shell to the smallest: what is innermost decides
         for (std::uint32_t s = 0; s < mesh.shells.size(); ++s)
             if (mesh.shells[s].role != Shell::Role::sheet && columns->winding(voxel, s) != 0)
-                in = mesh.shells[s].role == Shell::Role::solid;
+                in = mesh.rule == ShellRule::parity ? !in
+                                                    : mesh.shells[s].role == Shell::Role::solid;
         return in;
     }
 };
@@ -171,7 +90,10 @@ public:
                 shell_distance(leaf, s, face, end, shell);
                 face = end;
             }
-            if (role == Shell::Role::cavity)
+            if (data_.mesh.rule == ShellRule::parity)
+                for (int i = 0; i < 512; ++i) // in one of both
+                    out[i] = std::max(std::min(out[i], shell[i]), -std::max(out[i], shell[i]));
+            else if (role == Shell::Role::cavity)
                 subtract_values(out, shell, out);
             else
                 for (int i = 0; i < 512; ++i)

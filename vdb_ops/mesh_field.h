@@ -9,7 +9,8 @@ namespace taihu {
 /// A closed mesh as an exact signed distance. Sign: the integer winding number counted along grid
 /// columns, inside where it is not 0. Distance: nearest face, evaluated only in leaves that a face
 /// comes near; voxels within 1e-5 of the surface are 0. Several shells combine by min, cavities by
-/// max(d, -cavity), so walls inside a solid vanish. A shell that crosses itself has the right sign;
+/// max(d, -cavity), so walls inside a solid vanish; under ShellRule::parity by
+/// max(min(a, b), -max(a, b)). A shell that crosses itself has the right sign;
 /// its distance near the crossing is approximate.
 class MeshField final : public Field {
 public:

@@ -47,10 +47,16 @@ struct NodeResult {
 /// same whatever is computed beside it.
 class Rasterizer {
 public:
-    Rasterizer(const LatticeField& field, const Lattice& lattice)
+    /// \param region  whole leaves; what lies outside of it is left out.
+    Rasterizer(const LatticeField& field, const Lattice& lattice, const CoordBBox& region)
         : field_(field), box_(field.bounds()), half_width_(lattice.half_width_vox),
           voxel_(static_cast<float>(lattice.voxel_m)),
-          background_(static_cast<float>(lattice.half_width_vox * lattice.voxel_m)) {}
+          background_(static_cast<float>(lattice.half_width_vox * lattice.voxel_m)) {
+        box_.intersect(region);
+        if (box_.empty())
+            return;
+        box_ = CoordBBox(box_.min() & ~(kLeaf - 1), box_.max() | (kLeaf - 1));
+    }
 
     float background() const { return background_; }
     const CoordBBox& box() const { return box_; }
@@ -60,7 +66,9 @@ public:
         if (!box_.hasOverlap(CoordBBox::createCube(origin, kBlock)))
             return result;
         const auto sampler = field_.open(origin, result.whole);
-        if (!sampler)
+        const Cover whole = result.whole;
+        if (!sampler &&
+            (whole == Cover::outside || box_.isInside(CoordBBox::createCube(origin, kBlock))))
             return result;
         result.whole = Cover::surface;
         std::unique_ptr<Leaf> leaf;
@@ -68,7 +76,9 @@ public:
             for (int j = 0; j < kBlock; j += kLeaf)
                 for (int k = 0; k < kBlock; k += kLeaf) {
                     const Coord at = origin.offsetBy(i, j, k);
-                    Cover cover = sampler->cover(at);
+                    if (!box_.isInside(at))
+                        continue;
+                    Cover cover = sampler ? sampler->cover(at) : whole;
                     if (cover == Cover::surface)
                         cover = sample(*sampler, at, leaf);
                     if (cover == Cover::surface)
@@ -196,13 +206,14 @@ private:
 
 openvdb::FloatGrid::Ptr rasterize(const Field& field, const Lattice& lattice, Progress* progress) {
     check_lattice(lattice);
-    const std::unique_ptr<LatticeField> sampled = field.on(lattice, CoordBBox::inf());
-    const Rasterizer rasterizer(*sampled, lattice);
-    auto grid = openvdb::FloatGrid::create(rasterizer.background());
-    auto transform = openvdb::math::Transform::createLinearTransform(lattice.voxel_m);
-    transform->postTranslate({lattice.origin.x, lattice.origin.y, lattice.origin.z});
-    grid->setTransform(transform);
-    grid->setGridClass(openvdb::GRID_LEVEL_SET);
+    return rasterize(*field.on(lattice, CoordBBox::inf()), lattice, CoordBBox::inf(), progress);
+}
+
+openvdb::FloatGrid::Ptr rasterize(const LatticeField& field, const Lattice& lattice,
+                                  const openvdb::CoordBBox& region, Progress* progress) {
+    check_lattice(lattice);
+    const Rasterizer rasterizer(field, lattice, region);
+    auto grid = empty_level_set(lattice);
     if (rasterizer.box().empty())
         return grid;
 
@@ -238,6 +249,16 @@ openvdb::FloatGrid::Ptr rasterize(const Field& field, const Lattice& lattice, Pr
         else
             top->addTile(TopNode::coordToOffset(origin), -rasterizer.background(), false);
     }
+    return grid;
+}
+
+openvdb::FloatGrid::Ptr empty_level_set(const Lattice& lattice) {
+    auto grid =
+        openvdb::FloatGrid::create(static_cast<float>(lattice.half_width_vox * lattice.voxel_m));
+    auto transform = openvdb::math::Transform::createLinearTransform(lattice.voxel_m);
+    transform->postTranslate({lattice.origin.x, lattice.origin.y, lattice.origin.z});
+    grid->setTransform(transform);
+    grid->setGridClass(openvdb::GRID_LEVEL_SET);
     return grid;
 }
 

@@ -16,6 +16,15 @@ namespace taihu {
 openvdb::FloatGrid::Ptr rasterize(const Field& field, const Lattice& lattice,
                                   Progress* progress = nullptr);
 
+/// The part of that level set in `region` [voxels], whole leaves of 8^3: these leaves and inside
+/// tiles, the same bit for bit, and outside everywhere else.
+/// \param field  on `lattice`, prepared for a region that holds this one.
+openvdb::FloatGrid::Ptr rasterize(const LatticeField& field, const Lattice& lattice,
+                                  const openvdb::CoordBBox& region, Progress* progress = nullptr);
+
+/// A level set with nothing inside.
+openvdb::FloatGrid::Ptr empty_level_set(const Lattice& lattice);
+
 /// The lattice that `grid` lies on.
 /// \throws Error bad_argument, naming the grid: not a level set, voxels that are not cubes, a
 /// rotated

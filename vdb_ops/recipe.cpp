@@ -85,14 +85,29 @@ std::string shape_node(const ShapeSettings& s) {
         body["lumps"] = s.lumps;
         body["seed"] = s.seed;
     }
+    if (s.kind == ShapeKind::fractal_rock) {
+        body["base"] = s.fractal.base;
+        body["iterations"] = s.fractal.iterations;
+        body["damping"] = damping_name(s.fractal.damping);
+        body["along"] = along_name(s.fractal.along);
+        body["amplitude"] = s.fractal.amplitude;
+        body["hurst"] = {s.fractal.hurst_up, s.fractal.hurst_down};
+        body["corners"] = s.fractal.corners;
+        body["roundness"] = s.fractal.roundness;
+        body["seed"] = s.seed;
+    }
     return node(std::string(shape_name(s.kind)).c_str(), std::move(body));
 }
 
-std::string mesh_node(const std::string& name, const std::string& sha256, double unit_m,
-                      bool z_up) {
+std::string mesh_node(const std::string& name, const std::string& sha256, double unit_m, bool z_up,
+                      const CloseSettings& close) {
     Json body = {{"file", name}, {"sha256", sha256}, {"unit_m", unit_m}};
     if (z_up)
         body["up"] = "z";
+    if (close.rule != CloseRule::loops)
+        body["close"] = close_rule_name(close.rule);
+    if (close.shells != ShellRule::unite)
+        body["shells"] = shell_rule_name(close.shells);
     return node("mesh", std::move(body));
 }
 
@@ -130,14 +145,17 @@ std::string difference_node(const std::string& of, const std::string& minus) {
     return node("difference", {{"of", {parsed(of), parsed(minus)}}});
 }
 
-std::string clean_node(const std::string& of, std::optional<std::size_t> n_pieces,
-                       bool fill_bubbles) {
+std::string clean_node(const std::string& of, const CleanSettings& settings) {
     Json body = {{"of", parsed(of)}};
-    if (n_pieces)
-        body["pieces"] = *n_pieces;
+    if (settings.n_pieces)
+        body["pieces"] = *settings.n_pieces;
     else
         body["pieces"] = "all";
-    body["bubbles"] = fill_bubbles ? "fill" : "keep";
+    body["bubbles"] = settings.fill_bubbles ? "fill" : "keep";
+    if (settings.min_neck_m > 0)
+        body["min_neck_m"] = settings.min_neck_m;
+    if (settings.foot_deg > 0)
+        body["foot_deg"] = settings.foot_deg;
     return node("clean", std::move(body));
 }
 

@@ -5,6 +5,8 @@
 #include <vector>
 
 #include "stats/io/measurements.h"
+#include "vdb_ops/clean.h"
+#include "vdb_ops/mesh_diagnosis.h"
 #include "vdb_ops/place.h"
 #include "vdb_ops/shapes.h"
 
@@ -16,8 +18,10 @@ namespace taihu {
 /// text.
 
 std::string shape_node(const ShapeSettings& shape);
-/// A mesh file: its base name and hash, its unit of length, and whether its Z axis points up.
-std::string mesh_node(const std::string& name, const std::string& sha256, double unit_m, bool z_up);
+/// A mesh file: its base name and hash, its unit of length, whether its Z axis points up, and how
+/// it is closed (keys for what is not by default).
+std::string mesh_node(const std::string& name, const std::string& sha256, double unit_m, bool z_up,
+                      const CloseSettings& close = {});
 /// A level set that carries no recipe of its own.
 std::string level_set_node(const std::string& name, const std::string& sha256);
 /// Holes from a table.
@@ -31,9 +35,7 @@ struct HoleSources {
 std::string holes_node(const std::string& name, const std::string& sha256,
                        const Placement& placement, const HoleSources& sources = {});
 std::string difference_node(const std::string& of, const std::string& minus);
-/// \param n_pieces  absent: all.
-std::string clean_node(const std::string& of, std::optional<std::size_t> n_pieces,
-                       bool fill_bubbles);
+std::string clean_node(const std::string& of, const CleanSettings& settings);
 
 /// How a recipe's surface is written; meshes other than GLB are its first level.
 struct RecipeLod {

@@ -9,19 +9,23 @@
 #include "vdb_ops/carve.h"
 #include "vdb_ops/clean.h"
 #include "vdb_ops/combine_field.h"
+#include "vdb_ops/csg_field.h"
 #include "vdb_ops/level_set_box.h"
 #include "vdb_ops/level_set_field.h"
-#include "vdb_ops/mesh_field.h"
+#include "vdb_ops/mesh_solid.h"
 #include "vdb_ops/offset_field.h"
 #include "vdb_ops/place.h"
 #include "vdb_ops/placed_level_set_field.h"
 #include "vdb_ops/rasterize.h"
 #include "vdb_ops/solids_field.h"
+#include "vdb_ops/stored_field.h"
 
 namespace taihu {
 namespace {
 
 using Node = std::unique_ptr<RecipeNode>;
+
+constexpr double kResolved_vox = 1.5; ///< radius from which a hole keeps its shape
 
 [[noreturn]] void refuse(const std::string& where, const std::string& what) {
     throw Error(Fault::bad_input, where + ": " + what);
@@ -83,21 +87,22 @@ private:
 
 class MeshNode final : public RecipeNode {
 public:
-    MeshNode(TriMesh mesh, std::string where, CloseRule close)
+    MeshNode(TriMesh mesh, std::string where, const CloseSettings& close)
         : mesh_(std::move(mesh)), where_(std::move(where)), close_(close) {}
     Box box(const Similarity& at) const override { return placed(bounds(mesh_), at); }
     std::shared_ptr<const Field> field(const RecipeScene& scene,
                                        const Similarity& at) const override {
-        ClosedMesh closed = close_mesh(placed(mesh_, at), where_, close_, scene.progress);
-        for (const std::string& line : closed.diagnosis.lines())
+        const MeshSolid solid =
+            mesh_solid(placed(mesh_, at), where_, close_, scene.lattice, scene.progress);
+        for (const std::string& line : solid.diagnosis.lines(scene.lattice.voxel_m))
             scene.found.push_back(where_ + ": " + line);
-        return std::make_shared<MeshField>(std::move(closed));
+        return solid.field;
     }
 
 private:
     TriMesh mesh_;
     std::string where_;
-    CloseRule close_;
+    CloseSettings close_;
 };
 
 class LevelSetNode final : public RecipeNode {
@@ -111,6 +116,12 @@ public:
         if (at.is_identity() && same_lattice(*grid_, scene.lattice))
             return grid_;
         return RecipeNode::grid(scene, at);
+    }
+    std::shared_ptr<const Field> tile_field(const RecipeScene& scene,
+                                            const Similarity& at) const override {
+        if (at.is_identity() && same_lattice(*grid_, scene.lattice))
+            return std::make_shared<LevelSetField>(grid_);
+        return field(scene, at);
     }
     const openvdb::FloatGrid* lattice_giver() const override { return grid_.get(); }
 
@@ -236,6 +247,19 @@ public:
         return rasterize(CombineField(Combine::subtract, std::move(fields)), scene.lattice,
                          scene.progress);
     }
+    std::shared_ptr<const Field> tile_field(const RecipeScene& scene,
+                                            const Similarity& at) const override {
+        if (blend_m_ > 0)
+            return field(scene, at);
+        const auto base = std::make_shared<StoredField>(of_.front()->tile_field(scene, at));
+        const auto holes = std::make_shared<BallsField>(spheres(scene, at, nullptr));
+        const auto rock = std::make_shared<DifferenceField>(base, holes);
+        std::vector<std::shared_ptr<const Field>> fields = {std::make_shared<StoredField>(rock)};
+        add_others(scene, at, fields);
+        if (fields.size() == 1)
+            return rock;
+        return std::make_shared<CombineField>(Combine::subtract, std::move(fields));
+    }
     const openvdb::FloatGrid* lattice_giver() const override { return first_giver(of_); }
 
 private:
@@ -259,6 +283,12 @@ private:
                 holes->needs_solid() ? holes->spheres_in(*base, own, at) : holes->spheres(at);
             all.insert(all.end(), some.begin(), some.end());
         }
+        const auto n_small = std::count_if(all.begin(), all.end(), [&](const Sphere& hole) {
+            return hole.radius_m < kResolved_vox * scene.lattice.voxel_m;
+        });
+        if (n_small > 0)
+            scene.found.push_back(std::to_string(n_small) + " of " + std::to_string(all.size()) +
+                                  " holes below 1.5 voxels: carved, but not in shape");
         scene.holes.insert(scene.holes.end(), all.begin(), all.end());
         return all;
     }
@@ -282,6 +312,16 @@ public:
     }
     openvdb::FloatGrid::Ptr grid(const RecipeScene& scene, const Similarity& at) const override {
         return of_->grid(scene, at * by_);
+    }
+    std::shared_ptr<const Field> tile_field(const RecipeScene& scene,
+                                            const Similarity& at) const override {
+        return of_->tile_field(scene, at * by_);
+    }
+    std::optional<RecipeCleaning> cleaning() const override {
+        auto cleaning = of_->cleaning();
+        if (cleaning)
+            cleaning->by = by_ * cleaning->by;
+        return cleaning;
     }
 
 private:
@@ -364,19 +404,26 @@ public:
     openvdb::FloatGrid::Ptr grid(const RecipeScene& scene, const Similarity& at) const override {
         const auto of = of_->grid(scene, at);
         report_stage(scene.progress, "cleaning");
-        const CleanResult result = clean(*of, settings_, scene.progress);
-        if (result.n_pieces_removed + result.n_bubbles_filled > 0)
-            scene.found.push_back(where_ + ": " + std::to_string(result.n_pieces_removed) + " of " +
-                                  std::to_string(result.n_pieces) + " pieces removed (" +
-                                  rounded(result.removed_m3) + " m^3), " +
-                                  std::to_string(result.n_bubbles_filled) + " of " +
-                                  std::to_string(result.n_bubbles) + " sealed bubbles filled (" +
-                                  rounded(result.filled_m3) + " m^3)");
+        const CleanResult result = clean(*of, settings(at), scene.progress);
+        for (const std::string& line : cleaning_lines(result))
+            scene.found.push_back(where_ + ": " + line);
         return result.solid;
+    }
+    std::shared_ptr<const Field> tile_field(const RecipeScene& scene,
+                                            const Similarity& at) const override {
+        return std::make_shared<LevelSetField>(grid(scene, at));
+    }
+    std::optional<RecipeCleaning> cleaning() const override {
+        return RecipeCleaning{of_.get(), settings_, {}};
     }
     const openvdb::FloatGrid* lattice_giver() const override { return of_->lattice_giver(); }
 
 private:
+    CleanSettings settings(const Similarity& at) const {
+        CleanSettings placed = settings_;
+        placed.min_neck_m *= at.scale();
+        return placed;
+    }
     Node of_;
     CleanSettings settings_;
     std::string where_;
@@ -388,6 +435,11 @@ openvdb::FloatGrid::Ptr RecipeNode::grid(const RecipeScene& scene, const Similar
     return rasterize(*field(scene, at), scene.lattice, scene.progress);
 }
 
+std::shared_ptr<const Field> RecipeNode::tile_field(const RecipeScene& scene,
+                                                    const Similarity& at) const {
+    return field(scene, at);
+}
+
 Node make_shape_node(const ShapeSettings& shape) {
     return std::make_unique<ShapeNode>(shape);
 }
@@ -396,7 +448,7 @@ Node make_plane_node(const Similarity& at) {
     return std::make_unique<PlaneNode>(at);
 }
 
-Node make_mesh_node(TriMesh mesh, std::string where, CloseRule close) {
+Node make_mesh_node(TriMesh mesh, std::string where, const CloseSettings& close) {
     return std::make_unique<MeshNode>(std::move(mesh), std::move(where), close);
 }
 

@@ -12,9 +12,9 @@
 #include "stats/core/tri_mesh.h"
 #include "stats/law.h"
 #include "vdb_ops/clean.h"
-#include "vdb_ops/closed_mesh.h"
 #include "vdb_ops/combine_field.h"
 #include "vdb_ops/field.h"
+#include "vdb_ops/mesh_diagnosis.h"
 #include "vdb_ops/place.h"
 #include "vdb_ops/shapes.h"
 #include "vdb_ops/similarity.h"
@@ -29,6 +29,15 @@ struct RecipeScene {
     Progress* progress = nullptr;
 };
 
+class RecipeNode;
+
+/// What a node that cleans does: to which solid, put where.
+struct RecipeCleaning {
+    const RecipeNode* of = nullptr;
+    CleanSettings settings;
+    Similarity by; ///< `of` is put at `at * by` where the node is put at `at`
+};
+
 /// A solid of a recipe's tree, its files read, wherever it is put.
 class RecipeNode {
 public:
@@ -40,6 +49,11 @@ public:
                                                const Similarity& at) const = 0;
     /// The level set on the scene's lattice; that of field() unless a node needs one anyway.
     virtual openvdb::FloatGrid::Ptr grid(const RecipeScene& scene, const Similarity& at) const;
+    /// A field that rasterizes to grid(), bit for bit, in any part of space alone.
+    virtual std::shared_ptr<const Field> tile_field(const RecipeScene& scene,
+                                                    const Similarity& at) const;
+    /// Of a node that cleans, so that others may do it; nothing for the rest.
+    virtual std::optional<RecipeCleaning> cleaning() const { return std::nullopt; }
     /// A level set file in the tree, whose lattice the whole then takes; null without one.
     virtual const openvdb::FloatGrid* lattice_giver() const { return nullptr; }
 };
@@ -49,7 +63,8 @@ public:
 std::unique_ptr<RecipeNode> make_shape_node(const ShapeSettings& shape);
 /// What lies below y = 0, put at `at`.
 std::unique_ptr<RecipeNode> make_plane_node(const Similarity& at);
-std::unique_ptr<RecipeNode> make_mesh_node(TriMesh mesh, std::string where, CloseRule close);
+std::unique_ptr<RecipeNode> make_mesh_node(TriMesh mesh, std::string where,
+                                           const CloseSettings& close);
 std::unique_ptr<RecipeNode> make_level_set_node(openvdb::FloatGrid::Ptr grid);
 std::unique_ptr<RecipeNode> make_holes_node(std::vector<Sphere> spheres);
 /// \param box  where they are placed; nothing: in the solid that stands before them in a

@@ -150,10 +150,27 @@ std::filesystem::path asset(const Keys& keys, const char* key, const RecipeParse
                                "' beside the recipe; put it there, or name its folder (--assets)");
 }
 
+FractalSettings fractal_of(const Keys& keys) {
+    FractalSettings f;
+    if (keys.has("base"))
+        f.base = static_cast<int>(keys.whole("base", 5));
+    if (keys.has("iterations"))
+        f.iterations = static_cast<int>(keys.whole("iterations", 8));
+    f.damping = damping_from_name(keys.word("damping", damping_name(f.damping).data(), "none",
+                                            "interpolating", "approximating"));
+    f.along = along_from_name(keys.word("along", along_name(f.along).data(), "radius", "normal"));
+    f.amplitude = keys.number_or("amplitude", f.amplitude, 0, 1);
+    if (keys.has("hurst"))
+        std::tie(f.hurst_up, f.hurst_down) = keys.pair("hurst", 0.05, 2);
+    f.corners = keys.number_or("corners", f.corners, 0, 1);
+    f.roundness = keys.number_or("roundness", f.roundness, 0, 1);
+    return f;
+}
+
 Node parse_shape(ShapeKind kind, const json& body, const std::string& where, RecipeParser& parser) {
     ShapeSettings s;
     s.kind = kind;
-    const bool boulder = kind == ShapeKind::boulder;
+    const bool seeded = kind == ShapeKind::boulder || kind == ShapeKind::fractal_rock;
     const Keys keys = [&]() -> Keys {
         switch (kind) {
         case ShapeKind::torus:
@@ -162,6 +179,12 @@ Node parse_shape(ShapeKind kind, const json& body, const std::string& where, Rec
             return {body, where, {"size_m"}, {"subdivisions"}};
         case ShapeKind::boulder:
             return {body, where, {"size_m"}, {"subdivisions", "relief", "lumps", "seed"}};
+        case ShapeKind::fractal_rock:
+            return {body,
+                    where,
+                    {"size_m"},
+                    {"base", "iterations", "damping", "along", "amplitude", "hurst", "corners",
+                     "roundness", "seed"}};
         case ShapeKind::rounded_box:
             return {body, where, {"size_m"}, {"round_m"}};
         case ShapeKind::superquadric:
@@ -180,7 +203,9 @@ Node parse_shape(ShapeKind kind, const json& body, const std::string& where, Rec
         s.subdivisions = static_cast<int>(keys.whole("subdivisions", 8));
     s.relief = keys.number_or("relief", s.relief, 0, 0.9);
     s.lumps = keys.number_or("lumps", s.lumps, 0.1, 16);
-    if (boulder)
+    if (kind == ShapeKind::fractal_rock)
+        s.fractal = fractal_of(keys);
+    if (seeded)
         s.seed = seed_of(keys, parser);
     return make_shape_node(s);
 }
@@ -203,15 +228,19 @@ Node parse_plane(const json& body, const std::string& where, RecipeParser&) {
 }
 
 Node parse_mesh(const json& body, const std::string& where, RecipeParser& parser) {
-    const Keys keys(body, where, {"file", "sha256"}, {"unit_m", "up", "close"});
+    const Keys keys(body, where, {"file", "sha256"}, {"unit_m", "up", "close", "shells"});
     const auto path = asset(keys, "file", parser);
     const double unit_m = keys.number_or("unit_m", 1, 1e-9, 1e9);
     const bool z_up = keys.word("up", "y", "y", "z") == "z";
-    const bool open = keys.word("close", "loops", "loops", "none") == "none";
+    const std::string rule = keys.word("close", "loops", "loops", "winding", "plane", "none");
+    const std::string shells = keys.word("shells", "union", "union", "parity");
+    if (rule == "winding" && keys.has("shells"))
+        refuse(where, "'shells' is for shells taken one by one, and 'close' \"winding\" takes them "
+                      "all at once; drop one of them");
     if (!parser.assets.read_mesh)
         refuse(where, "nothing here reads mesh files; voxelize it first");
     return make_mesh_node(parser.assets.read_mesh(path, unit_m, z_up), where,
-                          open ? CloseRule::none : CloseRule::loops);
+                          close_settings(rule, shells));
 }
 
 Node parse_level_set(const json& body, const std::string& where, RecipeParser& parser) {
@@ -258,8 +287,10 @@ Node parse_embed(const json& body, const std::string& where, RecipeParser& parse
 }
 
 Node parse_clean(const json& body, const std::string& where, RecipeParser& parser) {
-    const Keys keys(body, where, {"of"}, {"pieces", "bubbles"});
+    const Keys keys(body, where, {"of"}, {"pieces", "bubbles", "min_neck_m", "foot_deg"});
     CleanSettings settings;
+    settings.min_neck_m = keys.number_or("min_neck_m", 0, 0, kMost_m);
+    settings.foot_deg = keys.number_or("foot_deg", 0, 0, 60);
     if (keys.has("pieces") && keys.value("pieces") == "all")
         settings.n_pieces.reset();
     else if (keys.has("pieces"))
@@ -418,7 +449,7 @@ std::unique_ptr<RecipeNode> parse_node(const json& node, const std::string& wher
     std::vector<std::string_view> known;
     for (const auto& [name, parse] : kNodes)
         known.push_back(name);
-    for (int i = 0; i <= static_cast<int>(ShapeKind::boulder); ++i) {
+    for (int i = 0; i <= static_cast<int>(ShapeKind::fractal_rock); ++i) {
         const auto shape = static_cast<ShapeKind>(i);
         if (shape_name(shape) == kind)
             return parse_shape(shape, body, inside, parser);

@@ -18,7 +18,7 @@ namespace {
 using nlohmann::json;
 using nlohmann::ordered_json;
 
-constexpr int kVersion = 1, kDefaultDim = 256;
+constexpr int kVersion = 1, kDefaultDim = 256, kCoarseDim = 128;
 constexpr std::size_t kMostLevels = 8;
 constexpr double kMostSeed = 1.8446744073709551e19;
 constexpr std::string_view kRequired[] = {"taihu_recipe", "solid"};
@@ -144,13 +144,8 @@ double voxel_of(const json& recipe, const std::string& where, const RecipeSettin
     return voxel_for(box, kDefaultDim);
 }
 
-double area_m2(const Box& box) {
-    const Vec3 s = box.size();
-    return 2 * (s.x * s.y + s.y * s.z + s.z * s.x);
-}
-
 /// What makes the solid again: the recipe with the settings in it, keys as they stood.
-std::string settled(const std::string& text, const RecipeSolid& made, std::uint64_t seed,
+std::string settled(const std::string& text, const RecipeReport& made, std::uint64_t seed,
                     double scale) {
     const ordered_json given = ordered_json::parse(text);
     ordered_json solid = given["solid"];
@@ -172,42 +167,106 @@ std::string settled(const std::string& text, const RecipeSolid& made, std::uint6
     return out.dump();
 }
 
+/// A recipe read and placed; what it says of itself goes into `made`.
+struct ReadyRecipe {
+    std::unique_ptr<RecipeNode> root;
+    Similarity at;
+    Box box;
+    Lattice lattice;
+
+    ReadyRecipe(const std::string& recipe, const std::string& where, const RecipeAssets& assets,
+                const RecipeSettings& settings, RecipeReport& made, Progress* progress) {
+        const json text = read_recipe(recipe, where);
+        if (settings.height_m && !(*settings.height_m > 0 && std::isfinite(*settings.height_m)))
+            throw Error(Fault::bad_argument,
+                        "height: " + shortest(*settings.height_m) + " m; must be > 0");
+        const std::uint64_t seed = seed_of(text, where, settings);
+        RecipeParser parser{assets, seed, nullptr, 0};
+        if (text.contains("material"))
+            parser.material = &text["material"];
+        report_stage(progress, "reading the recipe");
+        root = parse_node(text["solid"], where + ": solid", parser);
+        const Box own = solid_box(*root, where);
+        const double scale = settings.height_m ? *settings.height_m / own.size().y : 1;
+        at = Similarity::scaling(scale);
+        box = placed(own, at);
+        made.voxel_m = voxel_of(text, where, settings, box, scale);
+        made.lod = lod_of(text, where, scale);
+        lattice.voxel_m = made.voxel_m;
+        if (const openvdb::FloatGrid* giver = root->lattice_giver()) {
+            const Lattice given = lattice_of(*giver);
+            if (std::fabs(given.voxel_m - made.voxel_m) <= 1e-9 * made.voxel_m)
+                lattice = given;
+        }
+        made.recipe = settled(recipe, made, seed, scale);
+    }
+};
+
+RecipeEstimate memory_of(const ReadyRecipe& ready, const RecipeSettings& settings,
+                         Progress* progress) {
+    report_stage(progress, "estimating");
+    // Where holes of a law lie in a coarser solid is as good as where they will be.
+    Lattice coarse = ready.lattice;
+    coarse.voxel_m = std::max(coarse.voxel_m, ready.box.longest() / kCoarseDim);
+    std::vector<std::string> found;
+    std::vector<Sphere> holes;
+    const RecipeScene scene{coarse, found, holes, progress};
+    const auto cleaning = ready.root->cleaning();
+    const auto field = cleaning ? cleaning->of->field(scene, ready.at * cleaning->by)
+                                : ready.root->field(scene, ready.at);
+    RecipeEstimate estimate;
+    estimate.voxel_m = ready.lattice.voxel_m;
+    estimate.size = estimate_size(*field, ready.lattice);
+    estimate.memory = {.leaves = estimate.size.n_leaves,
+                       .cleaned = cleaning.has_value(),
+                       .meshed = settings.meshed};
+    estimate.limit_bytes = memory_limit_bytes(settings.memory_bytes);
+    return estimate;
+}
+
 } // namespace
+
+RecipeEstimate estimate_recipe(const std::string& recipe, const std::string& where,
+                               const RecipeAssets& assets, const RecipeSettings& settings,
+                               Progress* progress) {
+    RecipeReport made;
+    const ReadyRecipe ready(recipe, where, assets, settings, made, progress);
+    refuse_if_too_large(0, ready.box, made.voxel_m);
+    return memory_of(ready, settings, progress);
+}
 
 RecipeSolid make_recipe(const std::string& recipe, const std::string& where,
                         const RecipeAssets& assets, const RecipeSettings& settings,
                         Progress* progress) {
-    const json text = read_recipe(recipe, where);
-    if (settings.height_m && !(*settings.height_m > 0 && std::isfinite(*settings.height_m)))
-        throw Error(Fault::bad_argument,
-                    "height: " + shortest(*settings.height_m) + " m; must be > 0");
-    const std::uint64_t seed = seed_of(text, where, settings);
-    RecipeParser parser{assets, seed, nullptr, 0};
-    if (text.contains("material"))
-        parser.material = &text["material"];
-    report_stage(progress, "reading the recipe");
-    const auto root = parse_node(text["solid"], where + ": solid", parser);
-    const Box own = solid_box(*root, where);
-    const double scale = settings.height_m ? *settings.height_m / own.size().y : 1;
-    const Similarity at = Similarity::scaling(scale);
-    const Box box = placed(own, at);
-
     RecipeSolid made;
-    if (!(settings.coarsen >= 1 && settings.coarsen <= 64))
-        throw Error(Fault::bad_argument,
-                    "coarsen: " + shortest(settings.coarsen) + "; must be in 1..64");
-    made.voxel_m = settings.coarsen * voxel_of(text, where, settings, box, scale);
-    made.lod = lod_of(text, where, scale);
-    refuse_if_too_large(area_m2(box), box, made.voxel_m);
-    Lattice lattice;
-    lattice.voxel_m = made.voxel_m;
-    if (const openvdb::FloatGrid* giver = root->lattice_giver()) {
-        const Lattice given = lattice_of(*giver);
-        if (std::fabs(given.voxel_m - made.voxel_m) <= 1e-9 * made.voxel_m)
-            lattice = given;
-    }
-    made.solid = root->grid({lattice, made.found, made.holes, progress}, at);
-    made.recipe = settled(recipe, made, seed, scale);
+    const ReadyRecipe ready(recipe, where, assets, settings, made, progress);
+    refuse_if_too_large(0, ready.box, made.voxel_m);
+    MemoryUse least{.leaves = 0, .cleaned = true, .meshed = settings.meshed};
+    const double limit = memory_limit_bytes(settings.memory_bytes);
+    if (may_exceed(ready.box, made.voxel_m, least, limit))
+        refuse_if_over(memory_of(ready, settings, progress).memory, made.voxel_m, limit);
+    made.solid = ready.root->grid({ready.lattice, made.found, made.holes, progress}, ready.at);
+    return made;
+}
+
+RecipeTiles make_recipe_tiles(const std::string& recipe, const std::string& where,
+                              const RecipeAssets& assets, const RecipeSettings& settings,
+                              const std::filesystem::path& folder, int tile_voxels,
+                              Progress* progress) {
+    RecipeTiles made;
+    const ReadyRecipe ready(recipe, where, assets, settings, made, progress);
+    refuse_if_too_large(0, ready.box, made.voxel_m); // tiles are of any size
+    const RecipeScene scene{ready.lattice, made.found, made.holes, progress};
+    const auto cleaning = ready.root->cleaning();
+    TileSettings tiles{tile_voxels, {}};
+    if (cleaning)
+        tiles.clean = cleaning->settings;
+    const auto field = cleaning ? cleaning->of->tile_field(scene, ready.at * cleaning->by)
+                                : ready.root->tile_field(scene, ready.at);
+    made.tiles = write_tiles(folder, *field, ready.lattice, tiles, made.recipe, progress);
+    if (made.tiles.cleaned)
+        for (const std::string& line : cleaning_lines(*made.tiles.cleaned))
+            made.found.push_back(where + ": " + line);
     return made;
 }
 

@@ -11,7 +11,9 @@
 #include "stats/core/progress.h"
 #include "stats/core/sphere.h"
 #include "stats/core/tri_mesh.h"
+#include "vdb_ops/estimate.h"
 #include "vdb_ops/recipe.h"
+#include "vdb_ops/tiles.h"
 
 namespace taihu {
 
@@ -28,17 +30,26 @@ struct RecipeSettings {
     std::optional<double> voxel_m = {};  ///< > 0
     std::optional<int> dim = {};         ///< or voxels along the longest axis, 4..65536
     std::optional<double> height_m = {}; ///< all is scaled so that the solid's box is so high, > 0
-    std::optional<std::uint64_t> seed = {}; ///< of everything that has no seed of its own
-    double coarsen = 1; ///< times the voxel that all this comes to, 1..64: to see what it will be
+    std::optional<std::uint64_t> seed = {};  ///< of everything that has no seed of its own
+    std::optional<double> memory_bytes = {}; ///< at most so much, of what the machine has left
+    bool meshed = false;                     ///< a surface is made of it, which needs memory, too
 };
 
-struct RecipeSolid {
-    openvdb::FloatGrid::Ptr solid;
+/// What is made of a recipe, but for the solid.
+struct RecipeReport {
     double voxel_m = 0;
     std::optional<RecipeLod> lod;
     std::string recipe;             ///< what makes it again, the settings in it
     std::vector<Sphere> holes;      ///< that were carved, in the order of the recipe [m]
     std::vector<std::string> found; ///< what was repaired, placed and removed, by node
+};
+
+struct RecipeSolid : RecipeReport {
+    openvdb::FloatGrid::Ptr solid;
+};
+
+struct RecipeTiles : RecipeReport {
+    TilesResult tiles;
 };
 
 /// Makes the solid of a recipe (version 1, data/schema/recipe.schema.json).
@@ -52,10 +63,34 @@ struct RecipeSolid {
 /// \param where  stands for the recipe in messages: `rock.json`.
 /// \throws Error bad_input: not a recipe, with the node, the key, the value and what it may be; a
 ///         file that is another than the one meant; bad_argument: a setting; io: a file that is
-///         missing or cannot be read; unsupported: too large; what the operators throw.
+///         missing or cannot be read; unsupported: more memory than there is; what the operators
+///         throw.
 RecipeSolid make_recipe(const std::string& recipe, const std::string& where,
                         const RecipeAssets& assets, const RecipeSettings& settings = {},
                         Progress* progress = nullptr);
+
+/// What make_recipe() will need.
+struct RecipeEstimate {
+    double voxel_m = 0;
+    SizeEstimate size;
+    MemoryUse memory;
+    double limit_bytes = 0;
+};
+
+/// By estimate_size(); holes of a law are placed in a solid of at most 128 voxels for it.
+/// \throws Error as make_recipe(), but for memory.
+RecipeEstimate estimate_recipe(const std::string& recipe, const std::string& where,
+                               const RecipeAssets& assets, const RecipeSettings& settings = {},
+                               Progress* progress = nullptr);
+
+/// The same as tiles in a folder, for solids that are larger than memory: their union is, bit for
+/// bit, what make_recipe() makes. Where the recipe ends in `clean`, that is done across tiles; a
+/// `clean` inside of it, and holes of a law, need the level set of what they are made in.
+/// \param tile_voxels  as TileSettings. \throws Error as make_recipe() and write_tiles().
+RecipeTiles make_recipe_tiles(const std::string& recipe, const std::string& where,
+                              const RecipeAssets& assets, const RecipeSettings& settings,
+                              const std::filesystem::path& folder, int tile_voxels,
+                              Progress* progress = nullptr);
 
 /// A recipe with one value changed: `key` is a name that its `set` explains (`porosity`), or a path
 /// of names and numbers (`/solid/sphere/size_m/0`) to something that is there.

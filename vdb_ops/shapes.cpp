@@ -1,8 +1,8 @@
 #include "vdb_ops/shapes.h"
 
+#include <algorithm>
 #include <array>
 #include <cmath>
-#include <map>
 #include <numbers>
 #include <string>
 
@@ -12,6 +12,7 @@
 #include "stats/core/text.h"
 #include "stats/number_detail.h"
 #include "vdb_ops/balls_field.h"
+#include "vdb_ops/icosphere.h"
 #include "vdb_ops/mesh_field.h"
 #include "vdb_ops/octant_mesh_detail.h"
 #include "vdb_ops/solids_field.h"
@@ -20,9 +21,9 @@
 namespace taihu {
 namespace {
 
-constexpr std::array<std::string_view, 10> kNames = {
-    "sphere",  "ellipsoid", "box",          "rounded_box", "cylinder",
-    "capsule", "torus",     "superquadric", "icosphere",   "boulder"};
+constexpr std::array<std::string_view, 11> kNames = {
+    "sphere", "ellipsoid",    "box",       "rounded_box", "cylinder",    "capsule",
+    "torus",  "superquadric", "icosphere", "boulder",     "fractal_rock"};
 constexpr std::uint32_t kNoiseStream = 0x626c6472;
 
 void check_range(const char* name, double value, double lo, double hi) {
@@ -60,39 +61,10 @@ void check_settings(const ShapeSettings& s) {
     if (s.kind == ShapeKind::rounded_box)
         check_range("round_m", s.round_m, 1e-9,
                     0.5 * std::min({s.size_m.x, s.size_m.y, s.size_m.z}));
+    if (s.kind == ShapeKind::fractal_rock)
+        check_fractal(s.fractal);
     if (s.kind == ShapeKind::superquadric)
         check_superquadric(superquadric(s), "shape");
-}
-
-/// Icosphere of radius 1: 20 * 4^level triangles. Only + - * / sqrt, so the same everywhere.
-TriMesh icosphere(int level) {
-    const double g = (1 + std::sqrt(5.0)) / 2;
-    TriMesh mesh;
-    mesh.positions = {{-1, g, 0},  {1, g, 0},  {-1, -g, 0}, {1, -g, 0}, {0, -1, g},  {0, 1, g},
-                      {0, -1, -g}, {0, 1, -g}, {g, 0, -1},  {g, 0, 1},  {-g, 0, -1}, {-g, 0, 1}};
-    mesh.triangles = {{0, 11, 5}, {0, 5, 1},  {0, 1, 7},   {0, 7, 10}, {0, 10, 11},
-                      {1, 5, 9},  {5, 11, 4}, {11, 10, 2}, {10, 7, 6}, {7, 1, 8},
-                      {3, 9, 4},  {3, 4, 2},  {3, 2, 6},   {3, 6, 8},  {3, 8, 9},
-                      {4, 9, 5},  {2, 4, 11}, {6, 2, 10},  {8, 6, 7},  {9, 8, 1}};
-    for (Vec3& p : mesh.positions)
-        p = normalized(p);
-    for (int i = 0; i < level; ++i) {
-        std::map<std::pair<std::uint32_t, std::uint32_t>, std::uint32_t> middles;
-        const auto middle = [&](std::uint32_t a, std::uint32_t b) {
-            const auto [it, added] = middles.try_emplace(
-                std::minmax(a, b), static_cast<std::uint32_t>(mesh.positions.size()));
-            if (added)
-                mesh.positions.push_back(normalized(mesh.positions[a] + mesh.positions[b]));
-            return it->second;
-        };
-        std::vector<Triangle> finer;
-        for (const auto& [a, b, c] : mesh.triangles) {
-            const std::uint32_t ab = middle(a, b), bc = middle(b, c), ca = middle(c, a);
-            finer.insert(finer.end(), {{a, ab, ca}, {b, bc, ab}, {c, ca, bc}, {ab, bc, ca}});
-        }
-        mesh.triangles = std::move(finer);
-    }
-    return mesh;
 }
 
 /// Smooth noise in [-1, 1]: uniform values on the unit lattice, blended by 3t^2 - 2t^3.
@@ -115,7 +87,6 @@ double value_noise(const Rng& rng, const Vec3& p) {
 
 TriMesh boulder(const ShapeSettings& s) {
     TriMesh mesh = icosphere(s.subdivisions);
-    Box box;
     for (Vec3& p : mesh.positions) {
         double noise = 0, amplitude = 0.5, frequency = s.lumps;
         for (std::uint32_t octave = 0; octave < 5; ++octave) {
@@ -124,13 +95,8 @@ TriMesh boulder(const ShapeSettings& s) {
             frequency *= 2.03; // not 2: lattice planes of the octaves must not coincide
         }
         p *= 1 + s.relief * noise;
-        box.include(p);
     }
-    const Vec3 center = box.center(), size = box.size();
-    for (Vec3& p : mesh.positions)
-        for (int axis = 0; axis < 3; ++axis)
-            p[axis] = (p[axis] - center[axis]) * (s.size_m[axis] / size[axis]);
-    return mesh;
+    return fitted(std::move(mesh), s.size_m);
 }
 
 TriMesh box_mesh(const Vec3& half) {
@@ -202,8 +168,10 @@ TriMesh rounded_mesh(const Vec3& core, double round, int n) {
 } // namespace
 
 ShapeKind shape_kind(std::string_view name) {
+    std::string joined(name);
+    std::replace(joined.begin(), joined.end(), '-', '_');
     for (std::size_t i = 0; i < kNames.size(); ++i)
-        if (kNames[i] == name)
+        if (kNames[i] == joined)
             return static_cast<ShapeKind>(i);
     std::string known;
     for (const std::string_view k : kNames)
@@ -214,6 +182,15 @@ ShapeKind shape_kind(std::string_view name) {
 
 std::string_view shape_name(ShapeKind kind) {
     return kNames[static_cast<std::size_t>(kind)];
+}
+
+TriMesh fitted(TriMesh mesh, const Vec3& size_m) {
+    const Box box = bounds(mesh);
+    const Vec3 center = box.center(), size = box.size();
+    for (Vec3& p : mesh.positions)
+        for (int axis = 0; axis < 3; ++axis)
+            p[axis] = (p[axis] - center[axis]) * (size_m[axis] / size[axis]);
+    return mesh;
 }
 
 Box shape_box(const ShapeSettings& s) {
@@ -242,6 +219,8 @@ TriMesh shape_mesh(const ShapeSettings& s) {
         return superquadric_mesh(superquadric(s), sides / 4);
     case ShapeKind::boulder:
         return boulder(s);
+    case ShapeKind::fractal_rock:
+        return fitted(fractal_rock(s.fractal, s.seed), s.size_m);
     case ShapeKind::sphere:
     case ShapeKind::ellipsoid:
     case ShapeKind::icosphere:
@@ -278,10 +257,11 @@ std::unique_ptr<Field> shape_field(const ShapeSettings& s, const Similarity& at)
         return std::make_unique<SuperquadricField>(superquadric(s), at);
     case ShapeKind::icosphere:
     case ShapeKind::boulder:
+    case ShapeKind::fractal_rock:
         break;
     }
     return std::make_unique<MeshField>(
-        close_mesh(placed(shape_mesh(s), at), std::string(shape_name(s.kind)), CloseRule::none));
+        close_mesh(placed(shape_mesh(s), at), std::string(shape_name(s.kind)), {CloseRule::none}));
 }
 
 } // namespace taihu

@@ -137,7 +137,7 @@ std::unique_ptr<LatticeField> SuperquadricField::on(const Lattice& lattice,
     while (n < kMostCells && deepest_cut(shape_, n) > allowed)
         n *= 2;
     ClosedMesh mesh =
-        close_mesh(placed(superquadric_mesh(shape_, n), at_), "superquadric", CloseRule::none);
+        close_mesh(placed(superquadric_mesh(shape_, n), at_), "superquadric", {CloseRule::none});
     return std::make_unique<OwnedLatticeField>(std::move(mesh), lattice, region);
 }
 

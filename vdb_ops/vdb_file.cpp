@@ -16,7 +16,7 @@
 namespace taihu {
 namespace {
 
-constexpr const char* kRecipeKey = "taihu_recipe";
+constexpr const char *kRecipeKey = "taihu_recipe", *kTileKey = "taihu_tile";
 constexpr char kMagic[] = {' ', 'B', 'D', 'V', 0, 0, 0, 0};
 // magic 8, file version 4, library version 8, offsets flag 1: then 36 characters of id.
 constexpr std::size_t kIdAt = 21, kIdSize = 36;
@@ -111,6 +111,8 @@ VdbFile read_vdb(const std::filesystem::path& path) {
     check_finite(*result.solid, where);
     if (const auto recipe = result.solid->getMetadata<openvdb::StringMetadata>(kRecipeKey))
         result.recipe = recipe->value();
+    if (const auto tile = result.solid->getMetadata<openvdb::StringMetadata>(kTileKey))
+        result.tile = tile->value();
     return result;
 }
 
@@ -126,6 +128,11 @@ openvdb::FloatGrid::Ptr read_volume(const std::filesystem::path& path) {
 
 void write_vdb(const std::filesystem::path& path, const openvdb::FloatGrid& solid,
                const std::string& recipe) {
+    write_file(path, format_vdb(solid, recipe, path.string()));
+}
+
+std::string format_vdb(const openvdb::FloatGrid& solid, const std::string& recipe,
+                       const std::string& where, const std::string& tile) {
     auto grid = openvdb::FloatGrid::create(std::const_pointer_cast<openvdb::FloatTree>(
         std::static_pointer_cast<const openvdb::FloatTree>(
             solid.constTreePtr()))); // shares the tree
@@ -134,16 +141,18 @@ void write_vdb(const std::filesystem::path& path, const openvdb::FloatGrid& soli
     grid->setName("surface");
     if (!recipe.empty())
         grid->insertMeta(kRecipeKey, openvdb::StringMetadata(recipe));
+    if (!tile.empty())
+        grid->insertMeta(kTileKey, openvdb::StringMetadata(tile));
     openvdb::initialize();
     std::string bytes;
     try {
         bytes = Archive().bytes(grid);
     } catch (const std::exception& e) {
-        throw Error(Fault::io, path.string() + ": cannot write (" + printable(e.what(), 80) +
+        throw Error(Fault::io, where + ": cannot write (" + printable(e.what(), 80) +
                                    "); check memory and the folder");
     }
-    replace_id(bytes, path.string());
-    write_file(path, bytes);
+    replace_id(bytes, where);
+    return bytes;
 }
 
 } // namespace taihu

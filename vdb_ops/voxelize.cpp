@@ -5,7 +5,7 @@
 #include <fstream>
 
 #include "stats/core/error.h"
-#include "vdb_ops/mesh_field.h"
+#include "vdb_ops/mesh_solid.h"
 #include "vdb_ops/rasterize.h"
 
 namespace taihu {
@@ -83,16 +83,17 @@ void refuse_if_too_large(double area_m2, const Box& box, double voxel_m) {
 
 VoxelizeResult voxelize(const TriMesh& mesh, const std::string& where,
                         const VoxelizeSettings& settings, Progress* progress) {
-    ClosedMesh closed = close_mesh(mesh, where, settings.close, progress);
-    VoxelizeResult result;
-    result.diagnosis = closed.diagnosis;
     Lattice lattice;
     lattice.voxel_m = settings.voxel_m;
     lattice.half_width_vox = settings.half_width_vox;
-    if (settings.voxel_m > 0)
-        refuse_if_too_large(closed.diagnosis.area_m2,
-                            bounds({closed.positions, closed.triangles, {}}), settings.voxel_m);
-    result.solid = rasterize(MeshField(std::move(closed)), lattice, progress);
+    if (!(lattice.voxel_m > 0) || !std::isfinite(lattice.voxel_m))
+        throw Error(Fault::bad_argument, "voxelize: a voxel of " + std::to_string(lattice.voxel_m) +
+                                             " m, must be finite and > 0");
+    const MeshSolid solid = mesh_solid(mesh, where, settings.close, lattice, progress);
+    refuse_if_too_large(solid.diagnosis.area_m2, solid.box, lattice.voxel_m);
+    VoxelizeResult result;
+    result.diagnosis = solid.diagnosis;
+    result.solid = rasterize(*solid.field, lattice, progress);
     if (!any_inside(*result.solid))
         throw Error(Fault::bad_input, where + ": smaller than a voxel of " +
                                           std::to_string(settings.voxel_m) +

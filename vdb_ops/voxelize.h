@@ -3,26 +3,27 @@
 
 #include <openvdb/openvdb.h>
 
+#include "stats/core/box.h"
 #include "stats/core/progress.h"
 #include "stats/core/tri_mesh.h"
-#include "vdb_ops/closed_mesh.h"
+#include "vdb_ops/mesh_diagnosis.h"
 
 namespace taihu {
 
 struct VoxelizeSettings {
     double voxel_m = 0;       ///< > 0
     float half_width_vox = 3; ///< 2..16
-    CloseRule close = CloseRule::loops;
+    CloseSettings close = {};
 };
 
 struct VoxelizeResult {
     openvdb::FloatGrid::Ptr solid; ///< narrow-band level set [m], negative inside
-    MeshDiagnosis diagnosis;       ///< what was found and closed
+    MeshDiagnosis diagnosis;       ///< what was found and closed; lines() wants the voxel
 };
 
-/// Any triangle mesh as a level set: exact distances, signs by integer winding numbers.
+/// Any triangle mesh as a level set: mesh_solid() on the lattice of the voxels.
 /// \param where  stands for the mesh in messages.
-/// \throws Error as close_mesh(), rasterize() and refuse_if_too_large().
+/// \throws Error as mesh_solid(), rasterize() and refuse_if_too_large().
 VoxelizeResult voxelize(const TriMesh& mesh, const std::string& where,
                         const VoxelizeSettings& settings, Progress* progress = nullptr);
 

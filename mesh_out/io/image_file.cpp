@@ -7,14 +7,9 @@
 #include <cstring>
 #include <exception>
 
-#include <ImfChannelList.h>
-#include <ImfFrameBuffer.h>
-#include <ImfHeader.h>
-#include <ImfIO.h>
-#include <ImfOutputFile.h>
-#include <ImfStringAttribute.h>
 #include <png.h>
 
+#include "mesh_out/io/exr_file.h"
 #include "stats/core/error.h"
 #include "stats/core/file.h"
 
@@ -152,53 +147,6 @@ std::string png_bytes(const std::filesystem::path& path, const Image& image,
     return std::move(writer.bytes);
 }
 
-/// A file of OpenEXR in memory: it seeks back to fill in where its lines begin.
-class StringStream : public Imf::OStream {
-public:
-    StringStream() : Imf::OStream("memory") {}
-
-    void write(const char data[], int size) override {
-        const auto n = static_cast<std::size_t>(size);
-        if (bytes.size() < position_ + n)
-            bytes.resize(position_ + n);
-        bytes.replace(position_, n, data, n);
-        position_ += n;
-    }
-    std::uint64_t tellp() override { return position_; }
-    void seekp(std::uint64_t position) override { position_ = position; }
-
-    std::string bytes;
-
-private:
-    std::size_t position_ = 0;
-};
-
-std::string exr_bytes(const std::filesystem::path& path, const Image& image,
-                      const Attributes& attributes) {
-    StringStream stream;
-    try {
-        Imf::Header header(image.width, image.height);
-        header.compression() = Imf::ZIP_COMPRESSION;
-        for (const auto& [key, value] : attributes)
-            header.insert(key, Imf::StringAttribute(value));
-        const std::size_t pixel = sizeof(float) * static_cast<std::size_t>(image.channels);
-        const std::size_t row = pixel * static_cast<std::size_t>(image.width);
-        Imf::FrameBuffer frame;
-        for (int c = 0; c < image.channels; ++c) {
-            const std::string name(1, image.channels == 1 ? 'Y' : "RGBA"[c]);
-            header.channels().insert(name, Imf::Channel(Imf::FLOAT));
-            const char* base = reinterpret_cast<const char*>(image.pixels.data() + c);
-            frame.insert(name, Imf::Slice(Imf::FLOAT, const_cast<char*>(base), pixel, row));
-        }
-        Imf::OutputFile file(stream, header);
-        file.setFrameBuffer(frame);
-        file.writePixels(image.height);
-    } catch (const std::exception& e) {
-        throw Error(Fault::bad_argument, base_name(path) + ": OpenEXR refuses: " + e.what());
-    }
-    return std::move(stream.bytes);
-}
-
 struct PngShape {
     std::size_t width = 0, height = 0;
     std::size_t stored_row_bits = 0;
@@ -286,8 +234,13 @@ void write_image(const std::filesystem::path& path, const Image& image,
                     base_name(path) + ": " + std::to_string(image.pixels.size()) +
                         " numbers are no image of " + std::to_string(image.width) + " x " +
                         std::to_string(image.height) + " pixels; give width * height * channels");
-    write_file(path, extension == ".png" ? png_bytes(path, image, attributes)
-                                         : exr_bytes(path, image, attributes));
+    if (extension == ".png")
+        return write_file(path, png_bytes(path, image, attributes));
+    std::vector<std::string> channels = {"Y"};
+    if (image.channels > 1)
+        channels.assign({"R", "G", "B", "A"});
+    channels.resize(static_cast<std::size_t>(image.channels));
+    write_exr(path, {image, channels, attributes});
 }
 
 Image read_png(const std::filesystem::path& path) {

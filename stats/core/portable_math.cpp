@@ -1,6 +1,7 @@
 #include "stats/core/portable_math.h"
 
 #include <bit>
+#include <cmath>
 #include <cstdint>
 #include <limits>
 
@@ -51,6 +52,21 @@ double portable_log(double x) {
     if (exponent == 0)
         return f - (half_square - rest);
     return exponent * kLn2High - ((half_square - (rest + exponent * kLn2Low)) - f);
+}
+
+double portable_exp(double x) {
+    if (!(x < 710)) // a NaN too
+        return x != x ? x : std::numeric_limits<double>::infinity();
+    if (x < -746)
+        return 0;
+    const double k = std::floor(x / kLn2High + 0.5);
+    // |r| <= 0.35, so that the first term left out is below 2^-57.
+    const double r = (x - k * kLn2High) - k * kLn2Low;
+    constexpr int kTerms = 13;
+    double sum = 1;
+    for (int n = kTerms; n >= 1; --n)
+        sum = 1 + sum * r / n;
+    return std::ldexp(sum, static_cast<int>(k));
 }
 
 } // namespace taihu

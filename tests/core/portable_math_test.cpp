@@ -65,5 +65,25 @@ TEST(PortableLog, HasTheBitsOfTheRoundedTruth) {
     EXPECT_EQ(portable_log(std::numeric_limits<double>::denorm_min()), -0x1.74385446d71c3p+9);
 }
 
+TEST(PortableExp, AgreesWithTheLibraryWhereItIsFinite) {
+    std::int64_t worst = 0;
+    for (std::uint64_t i = 0; i < 200'000; ++i) {
+        const double x = -708 + 1417 * Rng{3, 1}.uniform(i), y = 4 * Rng{4, 1}.uniform(i) - 3;
+        worst = std::max({worst, ulps_apart(portable_exp(x), std::exp(x)),
+                          ulps_apart(portable_exp(y), std::exp(y))});
+    }
+    EXPECT_LE(worst, 2); // below two of ours, half of one of the library's
+}
+
+TEST(PortableExp, IsExactWhereTheAnswerIs) {
+    EXPECT_EQ(portable_exp(0), 1);
+    EXPECT_EQ(portable_exp(1000), std::numeric_limits<double>::infinity());
+    EXPECT_EQ(portable_exp(std::numeric_limits<double>::infinity()),
+              std::numeric_limits<double>::infinity());
+    EXPECT_EQ(portable_exp(-1000), 0);
+    EXPECT_EQ(portable_exp(-std::numeric_limits<double>::infinity()), 0);
+    EXPECT_TRUE(std::isnan(portable_exp(std::numeric_limits<double>::quiet_NaN())));
+}
+
 } // namespace
 } // namespace taihu

@@ -7,7 +7,11 @@
 
 #include "mesh_out/certificate.h"
 #include "stats/core/error.h"
+#include "stats/core/rng.h"
 #include "tests/support/level_sets.h"
+#include "vdb_ops/clean.h"
+#include "vdb_ops/rasterize.h"
+#include "vdb_ops/shapes.h"
 
 namespace taihu {
 namespace {
@@ -34,6 +38,45 @@ TEST(Extract, GivesABallItsVolumeAndPlace) {
     EXPECT_NEAR(signed_volume_m3(mesh), ball_m3, 0.003 * ball_m3);
     for (const Vec3& p : mesh.positions)
         EXPECT_NEAR(length(p), 1, 0.05 * 0.05); // voxel^2 / radius
+}
+
+TEST(Extract, MakesASolidOfAFractalRockThatCrossesItself) {
+    const ShapeSettings settings{
+        .kind = ShapeKind::fractal_rock,
+        .fractal = {.base = 0, .iterations = 2, .along = DisplaceAlong::normal, .amplitude = 0.8}};
+    const TriMesh rock = shape_mesh(settings);
+    const Certificate crossed = certify(rock);
+    EXPECT_TRUE(crossed.holds());
+    EXPECT_GT(crossed.n_self_intersections, 100u);
+    const auto solid = rasterize(*shape_field(settings), {0.02, {}, 3});
+    const Certificate c = certify(extract_uniform(*clean(*solid).solid));
+    EXPECT_TRUE(c.holds());
+    EXPECT_EQ(c.n_components, 1u);
+    EXPECT_LT(c.n_self_intersections, crossed.n_self_intersections / 20);
+    // Folds count twice in the mesh, or not at all where they are inside out.
+    EXPECT_NEAR(c.volume_m3, crossed.volume_m3, 0.1 * crossed.volume_m3);
+}
+
+TEST(Certificate, HoldsForFractalRocksOfAnySettings) {
+    for (std::uint64_t i = 0; i < 40; ++i) {
+        const auto at = [i](std::uint32_t draw) { return Rng{3, 8}.uniform(i, draw); };
+        ShapeSettings s{.kind = ShapeKind::fractal_rock,
+                        .size_m = {0.1 + at(0), 0.1 + 3 * at(1), 0.1 + at(2)}};
+        s.fractal = {.base = i % 3 == 0 ? 1 : 0,
+                     .iterations = i % 2 == 0 ? 2 : 1,
+                     .damping = static_cast<Damping>(i % 3),
+                     .along = static_cast<DisplaceAlong>(i / 3 % 2),
+                     .amplitude = at(3),
+                     .hurst_up = 0.05 + 1.95 * at(4),
+                     .hurst_down = 0.05 + 1.95 * at(5),
+                     .corners = at(6),
+                     .roundness = at(7)};
+        s.seed = i;
+        const Certificate c = certify(shape_mesh(s), {.self_intersections = false});
+        EXPECT_TRUE(c.holds()) << i;
+        EXPECT_EQ(c.n_components, 1u) << i;
+        EXPECT_EQ(c.genus, 0) << i;
+    }
 }
 
 TEST(Extract, IsCertifiedWithHolesThatCutEachOther) {

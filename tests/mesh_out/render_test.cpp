@@ -212,6 +212,21 @@ TEST(Render, ShadesWithNormalsOnlyWhenAsked) {
     EXPECT_EQ(render(mesh, quick()).pixels, smooth.pixels);
 }
 
+TEST(Render, TakesTheAlbedoOfAPlace) {
+    // A ball off the origin, dark where it is above its middle and light below, seen turned.
+    const Vec3 center{3, -2, 5};
+    RenderSettings settings = quick();
+    settings.turntable_deg = 130;
+    settings.albedo_at = [&](const Vec3& p) {
+        EXPECT_NEAR(length(p - center), 2, 0.01); // on the ball; chords of 64 sides
+        return p.y > center.y ? 0.0 : 0.5;
+    };
+    const Image image = render(ball(64, center, 2), settings);
+    const int x = image.width / 2;
+    EXPECT_EQ(image.at(x, image.height * 2 / 5)[0], 0);
+    EXPECT_GT(image.at(x, image.height * 3 / 5)[0], 0.05);
+}
+
 TEST(Render, DrawsDarkEdgesOverLightFaces) {
     RenderSettings settings = quick(192, 192);
     settings.wireframe = true;

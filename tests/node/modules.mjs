@@ -11,10 +11,9 @@ const base = path.basename(folder) === 'node_modules' ? path.dirname(folder) : f
 
 const require = createRequire(path.join(base, 'modules.cjs'));
 
-/** The module `name`, or an exit that says how to get it. */
-export function load(name) {
+function found(name, how) {
   try {
-    return require(name);
+    return how(name);
   } catch (error) {
     if (error.code !== 'MODULE_NOT_FOUND') throw error;
     const missing = fs.existsSync(path.join(base, 'node_modules')) ? name : 'node_modules';
@@ -27,3 +26,9 @@ export function load(name) {
 export function modulesFolder() {
   return path.join(base, 'node_modules');
 }
+
+/** The module `name`, or an exit that says how to get it. */
+export const load = (name) => found(name, require);
+
+/** The path of a file in a package, or the same exit. */
+export const resolve = (name) => found(name, require.resolve);

@@ -1,5 +1,5 @@
 // node validate_json.mjs SCHEMA.json FILE.json...: files against a JSON Schema (draft 2020-12), by ajv.
-// A FILE of `-` is standard input; an object with a `recipe` in it stands for that recipe.
+// A FILE of `-` is standard input; an object with a `recipe` in it stands for that recipe, but for tiles.json.
 import fs from 'node:fs';
 import { load } from './modules.mjs';
 
@@ -13,7 +13,7 @@ const check = new Ajv({ allErrors: true }).compile(JSON.parse(fs.readFileSync(sc
 let bad = 0;
 for (const file of files) {
   const json = JSON.parse(fs.readFileSync(file === '-' ? 0 : file));
-  if (!check(json.recipe ?? json)) {
+  if (!check('taihu_tiles' in json ? json : json.recipe ?? json)) {
     bad = 1;
     for (const e of check.errors) console.log(`${file}: ${e.instancePath || '/'} ${e.message}`);
   } else {

@@ -15,7 +15,7 @@ using testing::StartsWith;
 
 const std::vector<std::string> kVerbs = {"fit",    "sample", "shape", "voxelize", "carve",
                                          "mesh",   "lod",    "check", "measure",  "section",
-                                         "render", "info",   "rock"};
+                                         "render", "info",   "rock",  "relief"};
 
 long lines(const std::string& text) {
     return std::count(text.begin(), text.end(), '\n');
@@ -81,7 +81,10 @@ TEST(Command, ValuesOutOfRangeAreUsageErrors) {
           "taihu shape box --size 1,2 -o a.ply", "taihu shape box --dim 64 -o a.ply",
           "taihu shape superquadric --exponents 3 -o a.ply",
           "taihu shape superquadric --exponents 1,1,1 -o a.ply",
-          "taihu shape rounded_box --round 0.6 -o a.ply"}) {
+          "taihu shape rounded_box --round 0.6 -o a.ply",
+          "taihu shape fractal-rock --hurst 3 -o a.ply",
+          "taihu shape fractal-rock --damping smooth -o a.ply",
+          "taihu shape cave --wall 0.4 --room 0.05 --iterations 1 -o a.ply"}) {
         const Finished said = run(command, scratch.path());
         EXPECT_EQ(said.exit_code, 2) << command << said.err;
         EXPECT_EQ(lines(said.err), 1) << said.err;
@@ -154,7 +157,10 @@ TEST(Command, OptionsThatWouldDoNothingAreRefused) {
           "taihu carve a.vdb --holes h.csv --uniform -o b.vdb",
           "taihu mesh a.vdb --no-draco -o b.ply", "taihu mesh a.vdb --up z -o b.ply",
           "taihu shape box --round 0.1 -o b.ply", "taihu shape ellipsoid --exponents 1 -o b.ply",
-          "taihu shape boulder --seed -1 -o b.ply"}) {
+          "taihu shape boulder --seed -1 -o b.ply", "taihu shape boulder --hurst 1 -o b.ply",
+          "taihu shape fractal-rock --subdivisions 2 -o b.ply",
+          "taihu shape fractal-rock --rocks 3 -o b.ply", "taihu shape cave --stages s -o b.ply",
+          "taihu shape fractal-rock --damping none --stages s -o b.ply"}) {
         const Finished said = run(command, scratch.path());
         EXPECT_EQ(said.exit_code, 2) << command << said.err;
         EXPECT_EQ(lines(said.err), 1) << command;

@@ -48,6 +48,34 @@ TEST(Rock, MakesAgainWhatOtherVerbsMade) {
     }
 }
 
+TEST(Rock, MeshBasesAreClosedAsAskedAndMadeAgain) {
+    const Scratch folder;
+    // A cube of 100 mm with +Z up, open on top.
+    write_file(folder / "cube.obj", "v 0 0 0\nv 100 0 0\nv 100 100 0\nv 0 100 0\n"
+                                    "v 0 0 100\nv 100 0 100\nv 100 100 100\nv 0 100 100\n"
+                                    "f 4 3 2 1\nf 1 2 6 5\nf 2 3 7 6\nf 3 4 8 7\nf 4 1 5 8\n");
+    write_file(folder / "h.csv", "x_m,y_m,z_m,radius_m\n0.05,0.05,-0.05,0.02\n");
+    for (const std::string how :
+         {"--close loops", "--close winding", "--close plane", "--close loops --shells parity"}) {
+        must("taihu voxelize cube.obj --units mm --up z --dim 40 " + how + " -o base.vdb -q",
+             folder);
+        must("taihu carve cube.obj --unit 0.001 --up z --dim 40 " + how +
+                 " --holes h.csv -o rock.vdb -q",
+             folder);
+        for (const std::string file : {"base.vdb", "rock.vdb"}) {
+            must("taihu rock --from " + file + " -o again.vdb -q", folder);
+            EXPECT_TRUE(same_bytes(folder, file, "again.vdb")) << how << ' ' << file;
+        }
+        const Finished said = run("taihu measure base.vdb --json -q", folder.path());
+        EXPECT_NEAR(json::parse(said.out)["volume_m3"].get<double>(), 1e-3, 3e-5) << how;
+    }
+    for (const char* wrong : {"--close winding --shells parity", "--units furlong", "--up x"}) {
+        const Finished said =
+            run("taihu voxelize cube.obj " + std::string(wrong) + " -o no.vdb", folder.path());
+        EXPECT_EQ(said.exit_code, 2) << wrong << said.err;
+    }
+}
+
 TEST(Rock, AMeshOfAnotherFileIsRefused) {
     const Scratch folder;
     must("taihu shape boulder --subdivisions 3 -o base.ply -q", folder);

@@ -37,5 +37,13 @@ TEST(Units, AnglesAreInDegrees) {
         expect_error(Fault::bad_argument, "--tilt: '", [&] { angle_deg("--tilt", bad); });
 }
 
+TEST(Units, MemoryTakesDecimalUnits) {
+    EXPECT_EQ(memory_bytes("--memory", "4GB"), 4e9);
+    EXPECT_EQ(memory_bytes("--memory", "0.5MB"), 5e5);
+    EXPECT_EQ(memory_bytes("--memory", "1000"), 1000);
+    for (const char* text : {"", "GB", "4G", "-1GB", "0"})
+        expect_error(Fault::bad_argument, "write 4GB", [&] { memory_bytes("--memory", text); });
+}
+
 } // namespace
 } // namespace taihu

@@ -1,4 +1,6 @@
 // One real job of every verb.
+#include <set>
+
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
@@ -87,6 +89,54 @@ TEST(Verbs, ShapeMakesAMeshAndALevelSetOfOneSolid) {
         // Meshes are inscribed; the tube of 32 sides lacks 2 (pi / 32)^2 / 3 of its volume.
         EXPECT_NEAR(mesh["volume_m3"].get<double>(), solid, 0.01 * solid) << kind;
     }
+}
+
+TEST(SeedRow, D17TheNineStagesAreWritten) {
+    const Scratch scratch;
+    result("taihu shape fractal-rock --base 0 --size 1,0.7,0.9 --stages st -o rock.ply", scratch);
+    const std::pair<const char*, std::size_t> stages[] = {
+        {"1-base", 20},           {"2-displaced", 80},
+        {"3-damped", 320},        {"4-displaced-again", 1280},
+        {"5-damped-again", 5120}, {"6-rescaled", 5120},
+        {"7-lit", 5120},          {"8-textured", 5120},
+        {"9-bump-mapped", 81920}};
+    std::set<std::string> pictures;
+    for (const auto& [name, n] : stages) {
+        const json said = result("taihu check st/" + std::string(name) + ".glb", scratch);
+        EXPECT_EQ(said["levels"][0]["triangles"], n) << name;
+        pictures.insert(read_file(scratch / ("st/" + std::string(name) + ".png")));
+    }
+    EXPECT_EQ(pictures.size(), 9u);
+    const std::string dynamic = read_file(scratch / "st/9-bump-mapped.glb");
+    result(
+        "taihu shape fractal-rock --base 0 --size 1,0.7,0.9 --stages st --bump static -o rock.ply",
+        scratch); // D11
+    EXPECT_NE(read_file(scratch / "st/9-bump-mapped.glb"), dynamic);
+}
+
+TEST(Verbs, AFractalRockIsABaseForCarving) {
+    const Scratch scratch;
+    write_file(scratch / "holes.csv", "x_m,y_m,z_m,radius_m\n0,0,0.4,0.2\n");
+    result("taihu shape fractal-rock --iterations 2 --seed 3 -o base.ply", scratch);
+    const json carved =
+        result("taihu carve base.ply --dim 64 --holes holes.csv -o rock.ply", scratch);
+    EXPECT_TRUE(carved["certificate"]["holds"]);
+    const Finished twice = run("taihu shape fractal-rock --base 0 --along normal --amplitude 1 "
+                               "--iterations 2 -o crossed.ply",
+                               scratch.path());
+    EXPECT_EQ(twice.exit_code, 0) << twice.err;
+    EXPECT_THAT(twice.err, HasSubstr("pairs of triangles cross"));
+}
+
+TEST(Verbs, ACaveSaysWhatItIs) {
+    const Scratch scratch;
+    const json cave =
+        result("taihu shape cave --rocks 5 --base 0 --seed 2 --dim 64 -o cave.ply", scratch);
+    EXPECT_EQ(cave["voids"], 1);
+    EXPECT_GT(cave["mouth_m2"].get<double>(), 0);
+    EXPECT_EQ(cave["genus"], cave["certificate"]["genus"]);
+    result("taihu rock --from cave.ply -o again.ply", scratch);
+    EXPECT_EQ(read_file(scratch / "cave.ply"), read_file(scratch / "again.ply"));
 }
 
 TEST(Verbs, TheThesisTablesAreThoseOfTheThesis) {

@@ -8,6 +8,9 @@
 #include "tests/support/errors.h"
 #include "tests/support/grids.h"
 #include "vdb_ops/carve.h"
+#include "vdb_ops/combine_field.h"
+#include "vdb_ops/level_set_box.h"
+#include "vdb_ops/solids_field.h"
 #include "vdb_ops/volume.h"
 
 namespace taihu {
@@ -97,6 +100,63 @@ TEST(Clean, OfAHoledRockLeavesOnePieceWithoutBubblesAndIsIdempotent) {
     EXPECT_EQ(grid_hash(*twice.solid), grid_hash(*once.solid));
     const tbb::global_control one(tbb::global_control::max_allowed_parallelism, 1);
     EXPECT_EQ(grid_hash(*clean(*carved).solid), grid_hash(*once.solid));
+}
+
+/// Two balls, a third that is loose, and a bar between the first two.
+openvdb::FloatGrid::Ptr dumb_bell(double bar_radius_m, double voxel_m) {
+    const auto ends = std::make_shared<BallsField>(
+        std::array<Sphere, 3>{{{{-1.5, 0, 0}, 1}, {{1.5, 0, 0}, 0.8}, {{5, 0, 0}, 0.5}}});
+    const Similarity turn = Similarity::rotation({0, 0, 1}, kPi / 2); // from Y to X
+    const auto bar = std::make_shared<SolidsField>(
+        std::vector<AnalyticSolid>{{CylinderSolid{bar_radius_m, 1.5, 0}, turn}});
+    return rasterize(CombineField(Combine::unite, {ends, bar}), {voxel_m, {}, 3});
+}
+
+TEST(Clean, CutsNecksThatAreThinner) {
+    // With a bar within the half band, and one of 20 voxels with uniform blocks inside it.
+    for (const double voxel_m : {0.05, 0.02}) {
+        const auto rock = dumb_bell(0.2, voxel_m);
+        const CleanResult uncut = clean(*rock, {.min_neck_m = 0.3});
+        EXPECT_EQ(uncut.n_necked, 0u);
+        EXPECT_EQ(grid_hash(*uncut.solid), grid_hash(*clean(*rock).solid));
+        const CleanResult cut = clean(*rock, {.min_neck_m = 0.5});
+        EXPECT_EQ(cut.n_necked, 1u);
+        EXPECT_EQ(cut.n_pieces_removed, 1u); // the loose ball
+        const double left_m3 = volume_m3(*cut.solid);
+        // The large ball, and at most the bar.
+        EXPECT_GT(left_m3, 0.999 * ball_m3(1));
+        EXPECT_LT(left_m3, ball_m3(1) + kPi * 0.04 * 1.3);
+        EXPECT_NEAR(volume_m3(*rock) - cut.necked_m3 - cut.removed_m3, left_m3, 1e-9);
+        EXPECT_LT(level_set_box(*cut.solid).hi.x, 0.7);
+        EXPECT_NEAR(level_set_box(*cut.solid).lo.x, -2.5, 0.1 * voxel_m);
+        EXPECT_EQ(clean(*cut.solid).n_pieces, 1u);
+        const CleanResult both = clean(*rock, {.n_pieces = 2, .min_neck_m = 0.5});
+        EXPECT_EQ(both.n_necked, 0u);
+        EXPECT_EQ(both.n_pieces_removed, 1u);
+    }
+}
+
+TEST(Clean, ACutIsALevelSet) {
+    const CleanResult cut = clean(*dumb_bell(0.25, 0.02), {.min_neck_m = 0.6});
+    // Signs change where there are distances alone, and those are of the surface beside them.
+    for (auto it = cut.solid->cbeginValueOn(); it; ++it)
+        for (int axis = 0; axis < 3; ++axis) {
+            openvdb::Coord next = it.getCoord();
+            ++next[axis];
+            const float other = cut.solid->tree().getValue(next);
+            // A step of one voxel, and as much again where the cut's steps meet the bar.
+            ASSERT_LE(std::fabs(other - *it), 2.0f * 0.02f) << it.getCoord();
+        }
+    const auto values = cut.solid->getConstAccessor();
+    for (int x = -130; x < 60; ++x)
+        ASSERT_FALSE(values.getValue({x, 0, 0}) < 0 && values.getValue({x + 1, 0, 0}) >= 0.06f);
+}
+
+TEST(Clean, RefusesNecksOfAllPieces) {
+    expect_error(Fault::bad_argument, "how many pieces stay",
+                 [] { clean(*ball_rock(), {.n_pieces = std::nullopt, .min_neck_m = 0.1}); });
+    expect_error(Fault::bad_argument, "min_neck_m is -1",
+                 [] { clean(*ball_rock(), {.min_neck_m = -1}); });
 }
 
 TEST(Clean, RefusesNothing) {

@@ -1,45 +1,16 @@
 #include "vdb_ops/mesh_field.h"
 
-#include <numbers>
-
 #include <tbb/global_control.h>
 
 #include "stats/core/rng.h"
 #include "tests/support/errors.h"
 #include "tests/support/grids.h"
+#include "tests/support/mesh_oracle.h"
 #include "vdb_ops/shapes.h"
 #include "vdb_ops/volume.h"
 
 namespace taihu {
 namespace {
-
-/// Distance to a triangle in double, region by region (independent of the kernel).
-double triangle_distance(const Vec3& p, const Vec3& a, const Vec3& b, const Vec3& c) {
-    const auto segment = [&p](const Vec3& s, const Vec3& e) {
-        const Vec3 d = e - s;
-        const double t = std::clamp(dot(p - s, d) / length_squared(d), 0.0, 1.0);
-        return length(p - s - d * t);
-    };
-    double best = std::min({segment(a, b), segment(b, c), segment(c, a)});
-    const Vec3 n = cross(b - a, c - a);
-    const bool over = dot(cross(b - a, p - a), n) >= 0 && dot(cross(c - b, p - b), n) >= 0 &&
-                      dot(cross(a - c, p - c), n) >= 0;
-    if (over)
-        best = std::min(best, std::fabs(dot(p - a, n)) / length(n));
-    return best;
-}
-
-double winding(const ClosedMesh& mesh, const Vec3& p) {
-    double sum = 0;
-    for (const Triangle& t : mesh.triangles) {
-        const Vec3 a = mesh.positions[t[0]] - p, b = mesh.positions[t[1]] - p,
-                   c = mesh.positions[t[2]] - p;
-        const double la = length(a), lb = length(b), lc = length(c);
-        sum += 2 * std::atan2(dot(a, cross(b, c)),
-                              la * lb * lc + dot(a, b) * lc + dot(b, c) * la + dot(c, a) * lb);
-    }
-    return sum / (4 * std::numbers::pi);
-}
 
 /// Every `step`-th voxel of the box against brute force.
 void expect_exact(const TriMesh& given, double voxel_m, int step) {
@@ -52,14 +23,12 @@ void expect_exact(const TriMesh& given, double voxel_m, int step) {
         for (int j = int(box.lo.y / voxel_m); j <= int(box.hi.y / voxel_m); j += step)
             for (int k = int(box.lo.z / voxel_m); k <= int(box.hi.z / voxel_m); k += step) {
                 const Vec3 p{i * voxel_m, j * voxel_m, k * voxel_m};
-                double d = 1e300;
-                for (const Triangle& t : field.mesh().triangles)
-                    d = std::min(d, triangle_distance(p, field.mesh().positions[t[0]],
-                                                      field.mesh().positions[t[1]],
-                                                      field.mesh().positions[t[2]]));
+                const ClosedMesh& mesh = field.mesh();
+                const double d = mesh_distance(mesh.positions, mesh.triangles, p);
                 const float value = accessor.getValue(openvdb::Coord(i, j, k));
                 if (d > 1e-9 * voxel_m) { // on the surface itself either side is right
-                    ASSERT_EQ(value<0, std::fabs(winding(field.mesh(), p))> 0.5)
+                    ASSERT_EQ(
+                        value<0, std::fabs(mesh_winding(mesh.positions, mesh.triangles, p))> 0.5)
                         << i << ' ' << j << ' ' << k;
                 }
                 // 1e-5 voxel: float rows of leaf-local coordinates.

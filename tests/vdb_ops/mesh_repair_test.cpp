@@ -29,6 +29,50 @@ TEST(RepairMesh, CapsAnOpenLoop) {
     EXPECT_NEAR(volume(closed), 1, 1e-14); // the hole is flat, so its fan is the face again
 }
 
+TEST(RepairMesh, CapsALoopThatBendsInwardByEarsNotByAFan) {
+    // A prism over an L, open at the top: a fan from the middle would reach over the notch.
+    const std::vector<Vec3> outline = {{0, 0, 0},  {4, 0, 0},  {4, 0, -1},
+                                       {1, 0, -1}, {1, 0, -4}, {0, 0, -4}};
+    TriMesh mesh;
+    for (const double y : {0.0, 1.0})
+        for (const Vec3& p : outline)
+            mesh.positions.push_back({p.x, y, p.z});
+    for (std::uint32_t k = 0; k < 6; ++k) {
+        const std::uint32_t next = (k + 1) % 6;
+        mesh.triangles.push_back({k, next, next + 6});
+        mesh.triangles.push_back({k, next + 6, k + 6});
+    }
+    const RepairedMesh closed = repair(mesh);
+    EXPECT_EQ(closed.diagnosis.loops.size(), 2u);
+    EXPECT_NEAR(closed.cap_area_m2[0], 2 * 7, 1e-12); // an L of 4 + 3, nothing twice
+    EXPECT_NEAR(volume(closed), 7, 1e-12);
+}
+
+TEST(RepairMesh, TakesAsLongAsTheLoopIsLong) {
+    // A strip of 2 * 10^5 faces has one loop of as many edges.
+    TriMesh strip;
+    constexpr std::uint32_t n = 100'000;
+    for (std::uint32_t i = 0; i <= n; ++i)
+        for (const double y : {0.0, 1.0})
+            strip.positions.push_back({double(i), y, 0});
+    for (std::uint32_t i = 0; i < n; ++i) {
+        strip.triangles.push_back({2 * i, 2 * i + 2, 2 * i + 1});
+        strip.triangles.push_back({2 * i + 1, 2 * i + 2, 2 * i + 3});
+    }
+    ASSERT_EQ(repair(strip).diagnosis.loops.size(), 1u); // CTest's time limit is the test
+    EXPECT_EQ(repair(strip).diagnosis.loops[0].n_edges, 2 * n + 2);
+}
+
+TEST(RepairMesh, TakesAsLongAsFacesAreManyRoundOneEdge) {
+    TriMesh book;
+    book.positions = {{0, 0, 0}, {0, 1, 0}};
+    for (std::uint32_t i = 0; i < 100'000; ++i) {
+        book.positions.push_back({std::cos(0.001 * i), 0, std::sin(0.001 * i)});
+        book.triangles.push_back({0, 1, i + 2});
+    }
+    EXPECT_EQ(repair_mesh(book, 0, CloseRule::none).diagnosis.n_nonmanifold_edges, 1u);
+}
+
 TEST(RepairMesh, WeldsCornersThatAreGivenTwice) {
     TriMesh soup;
     for (const Triangle& t : cube().triangles)
@@ -99,8 +143,19 @@ TEST(RepairMesh, WeldsWithinATolerance) {
     TriMesh soup = cube();
     soup.positions.push_back(soup.positions[soup.triangles[0][0]] + Vec3{1e-6, 0, 0});
     soup.triangles[0][0] = 8;
-    EXPECT_EQ(repair_mesh(soup, 0, CloseRule::none).positions.size(), 9u);
-    EXPECT_EQ(repair_mesh(soup, 1e-5, CloseRule::none).positions.size(), 8u);
+    EXPECT_EQ(repair_mesh(soup, 0, CloseRule::none).diagnosis.n_open_edges, 4u);
+    EXPECT_EQ(repair_mesh(soup, 1e-5, CloseRule::none).diagnosis.n_open_edges, 0u);
+    EXPECT_EQ(repair_mesh(soup, std::nullopt, CloseRule::none).diagnosis.weld_share, 1e-6);
+}
+
+TEST(RepairMesh, WeldsOnlyCornersOnOpenEdges) {
+    TriMesh mesh = cube(); // one crack, and a closed grain far smaller than the tolerance
+    mesh.positions.push_back(mesh.positions[mesh.triangles[0][0]] + Vec3{1e-6, 0, 0});
+    mesh.triangles[0][0] = 8;
+    append(mesh, cube({2, 0, 0}, 1e-6));
+    const RepairedMesh repaired = repair_mesh(mesh, 1e-4, CloseRule::none);
+    EXPECT_EQ(repaired.triangles.size(), 24u);
+    EXPECT_EQ(repaired.diagnosis.n_repeated, 0u);
 }
 
 } // namespace

@@ -9,6 +9,7 @@
 #include "stats/core/file.h"
 #include "stats/core/sha256.h"
 #include "stats/io/holes_file.h"
+#include "tests/support/cube_mesh.h"
 #include "tests/support/errors.h"
 #include "tests/support/grids.h"
 #include "tests/support/scratch.h"
@@ -227,6 +228,32 @@ TEST(RecipeSolid, SaysWhereARecipeIsWrong) {
                  [] { make_recipe(R"({"taihu_recipe": 2, "solid": {}})", "r.json", {}); });
     expect_error(Fault::bad_input, "no recipe", [] { make_recipe("[1]", "r.json", {}); });
     expect_error(Fault::bad_argument, "height", [] { made(kBall, {.height_m = -1.0}); });
+}
+
+TEST(RecipeSolid, MeshesAreClosedAsTheyAsk) {
+    const Scratch folder;
+    write_file(folder / "nest.obj", "the callback knows what it holds");
+    const std::string file =
+        R"("file": "nest.obj", "sha256": ")" + sha256_hex(read_file(folder / "nest.obj")) + '"';
+    TriMesh nested = cube();
+    nested.triangles.resize(10); // open at x = 1/2
+    append(nested, cube({}, 0.5));
+    const RecipeAssets assets{{folder.path()},
+                              [&](const std::filesystem::path&, double, bool) { return nested; }};
+    const auto with = [&](const std::string& keys) {
+        return made(R"({"mesh": {)" + file + keys + "}}", {}, assets);
+    };
+    EXPECT_NEAR(volume_m3(*with("").solid), 1, 0.02);
+    EXPECT_NEAR(volume_m3(*with(R"(, "shells": "parity")").solid), 1 - 0.125, 0.02);
+    EXPECT_NEAR(volume_m3(*with(R"(, "close": "winding")").solid), 1, 0.02);
+    EXPECT_NEAR(volume_m3(*with(R"(, "close": "plane")").solid), 1, 0.02);
+    EXPECT_THAT(with(R"(, "close": "plane")").found,
+                testing::Contains(testing::HasSubstr("closed with flat bases")));
+    expect_error(Fault::bad_input, "open: 4 open edges", [&] { with(R"(, "close": "none")"); });
+    expect_error(Fault::bad_input, "must be one of loops, winding, plane, none",
+                 [&] { with(R"(, "close": "fan")"); });
+    expect_error(Fault::bad_input, "drop one of them",
+                 [&] { with(R"(, "close": "winding", "shells": "parity")"); });
 }
 
 TEST(RecipeSolid, SettingsReplaceValues) {

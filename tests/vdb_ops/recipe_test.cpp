@@ -13,7 +13,7 @@ TEST(Recipe, IsWrittenInOneOrderAndShortestNumbers) {
     const std::string solid =
         clean_node(difference_node(shape_node({.kind = ShapeKind::box, .size_m = {1, 2, 0.5}}),
                                    holes_node("law.json", "ab", placement)),
-                   1, true);
+                   {});
     EXPECT_EQ(format_recipe(solid, 0.01, 7),
               R"({"taihu_recipe":1,"seed":7,"voxel_m":0.01,"solid":{"clean":{"of":{"difference":)"
               R"({"of":[{"box":{"size_m":[1.0,2.0,0.5]}},{"holes":{"law":"law.json","sha256":"ab",)"

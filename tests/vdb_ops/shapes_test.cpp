@@ -16,7 +16,7 @@ std::vector<ShapeSettings> all_kinds() {
     using enum ShapeKind;
     std::vector<ShapeSettings> all;
     for (const ShapeKind kind : {sphere, ellipsoid, box, rounded_box, cylinder, capsule, torus,
-                                 superquadric, icosphere, boulder}) {
+                                 superquadric, icosphere, boulder, fractal_rock}) {
         ShapeSettings s{.kind = kind, .tube_m = 0.3, .subdivisions = 4};
         if (kind == capsule)
             s.size_m = {0.6, 1, 0.6};

@@ -1,4 +1,4 @@
-#include "mesh_out/io/polygons_detail.h"
+#include "stats/core/polygon.h"
 
 #include <algorithm>
 #include <cmath>

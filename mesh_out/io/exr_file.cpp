@@ -1,0 +1,263 @@
+#include "mesh_out/io/exr_file.h"
+
+#include <algorithm>
+#include <cstdint>
+#include <cstring>
+#include <exception>
+
+#include <Iex.h>
+#include <ImfChannelList.h>
+#include <ImfFrameBuffer.h>
+#include <ImfHeader.h>
+#include <ImfIO.h>
+#include <ImfInputFile.h>
+#include <ImfOutputFile.h>
+#include <ImfStringAttribute.h>
+
+#include "stats/core/error.h"
+#include "stats/core/file.h"
+#include "stats/core/text.h"
+
+namespace taihu {
+namespace {
+
+constexpr std::size_t kMaxSamples = std::size_t{1} << 28;
+constexpr std::size_t kMaxDeflateRatio = 1032; // no deflate stream unpacks to more; the others pack
+                                               // less than that, but for DWA
+constexpr std::uint32_t kTiled = 0x200, kLongNames = 0x400, kDeep = 0x800, kParts = 0x1000;
+
+/// A file of OpenEXR in memory: it seeks back to fill in where its lines begin.
+class StringOutput : public Imf::OStream {
+public:
+    StringOutput() : Imf::OStream("memory") {}
+
+    void write(const char data[], int size) override {
+        const auto n = static_cast<std::size_t>(size);
+        if (bytes.size() < position_ + n)
+            bytes.resize(position_ + n);
+        bytes.replace(position_, n, data, n);
+        position_ += n;
+    }
+    std::uint64_t tellp() override { return position_; }
+    void seekp(std::uint64_t position) override { position_ = position; }
+
+    std::string bytes;
+
+private:
+    std::size_t position_ = 0;
+};
+
+class StringInput : public Imf::IStream {
+public:
+    explicit StringInput(std::string_view bytes) : Imf::IStream("memory"), bytes_(bytes) {}
+
+    bool read(char data[], int size) override {
+        const auto n = static_cast<std::size_t>(size);
+        if (size < 0 || position_ > bytes_.size() || n > bytes_.size() - position_)
+            throw Iex::InputExc("the file is cut short");
+        std::memcpy(data, bytes_.data() + position_, n);
+        position_ += n;
+        return position_ < bytes_.size();
+    }
+    std::uint64_t tellg() override { return position_; }
+    void seekg(std::uint64_t position) override { position_ = position; }
+
+private:
+    std::string_view bytes_;
+    std::size_t position_ = 0;
+};
+
+/// Walks over the header before OpenEXR does, which allocates what any attribute asks for.
+class HeaderWalk {
+public:
+    HeaderWalk(std::string_view bytes, std::string name) : bytes_(bytes), name_(std::move(name)) {}
+
+    void check() {
+        if (bytes_.substr(0, 4) != "\x76\x2f\x31\x01")
+            throw bad("not an EXR", "give a file that begins like one");
+        at_ = 4;
+        const std::uint32_t version = word();
+        if (version & (kDeep | kParts))
+            throw Error(Fault::unsupported, name_ + ": has " +
+                                                (version & kParts ? "several parts" : "deep data") +
+                                                "; save it as one flat picture");
+        if ((version & 0xff) > 2 || version & ~(0xffu | kTiled | kLongNames))
+            throw Error(Fault::unsupported,
+                        name_ + ": is of an unknown version; save it as OpenEXR 2");
+        while (!text().empty()) {
+            const std::string_view type = text();
+            const std::size_t size = word();
+            if (size > bytes_.size() - at_)
+                throw cut_short();
+            if (type == "preview")
+                check_preview(size);
+            at_ += size;
+        }
+    }
+
+private:
+    Error bad(const std::string& what, const char* remedy) const {
+        return Error(Fault::bad_input, name_ + ": " + what + "; " + remedy);
+    }
+    Error cut_short() const {
+        return bad("the header is cut short or damaged", "save it again as EXR");
+    }
+    std::uint32_t word() {
+        if (bytes_.size() - at_ < 4)
+            throw cut_short();
+        std::uint32_t value = 0;
+        for (std::size_t i = 4; i-- > 0;)
+            value = value << 8 | static_cast<unsigned char>(bytes_[at_ + i]);
+        at_ += 4;
+        return value;
+    }
+    std::string_view text() {
+        const std::size_t end = bytes_.find('\0', at_);
+        if (end == std::string_view::npos || end - at_ > 255)
+            throw cut_short();
+        const std::string_view out = bytes_.substr(at_, end - at_);
+        at_ = end + 1;
+        return out;
+    }
+    void check_preview(std::size_t size) {
+        const std::size_t start = at_;
+        const std::uint64_t width = word(), height = word();
+        if (width > 65536 || height > 65536 || size < 8 + 4 * width * height)
+            throw cut_short();
+        at_ = start;
+    }
+
+    std::string_view bytes_;
+    std::string name_;
+    std::size_t at_ = 0;
+};
+
+std::string joined(std::span<const std::string_view> names) {
+    std::string out;
+    for (const std::string_view n : names)
+        out += (out.empty() ? "" : ", ") + printable(n);
+    return out;
+}
+
+/// The channels to read: those asked for, or all. None is subsampled.
+std::vector<std::string> chosen(const Imf::ChannelList& list, std::span<const std::string> asked,
+                                const std::string& name) {
+    std::vector<std::string> out(asked.begin(), asked.end());
+    std::vector<std::string_view> known;
+    for (auto it = list.begin(); it != list.end(); ++it)
+        known.push_back(it.name());
+    if (out.empty())
+        out.assign(known.begin(), known.end());
+    for (const std::string& c : out) {
+        const Imf::Channel* channel = list.findChannel(c);
+        if (!channel)
+            throw Error(Fault::bad_input,
+                        name + ": has no channel '" + printable(c) + "'; it has " + joined(known));
+        if (channel->xSampling != 1 || channel->ySampling != 1)
+            throw Error(Fault::unsupported, name + ": channel '" + printable(c) +
+                                                "' is subsampled; save it at full size");
+    }
+    return out;
+}
+
+Imf::FrameBuffer frame_of(Image& image, std::span<const std::string> channels, Imath::V2i origin) {
+    const std::size_t pixel = sizeof(float) * static_cast<std::size_t>(image.channels);
+    const std::size_t row = pixel * static_cast<std::size_t>(image.width);
+    // OpenEXR adds the coordinates of a pixel to the base: in integers, for it may point nowhere.
+    const auto base = reinterpret_cast<std::uintptr_t>(image.pixels.data()) -
+                      static_cast<std::uintptr_t>(static_cast<std::intptr_t>(origin.x)) * pixel -
+                      static_cast<std::uintptr_t>(static_cast<std::intptr_t>(origin.y)) * row;
+    Imf::FrameBuffer frame;
+    for (std::size_t c = 0; c < channels.size(); ++c)
+        frame.insert(
+            channels[c],
+            Imf::Slice(Imf::FLOAT, reinterpret_cast<char*>(base + c * sizeof(float)), pixel, row));
+    return frame;
+}
+
+/// The size that a header gives, once it is one that the file can hold.
+Image empty_image(const Imf::Header& header, std::size_t n_channels, std::size_t n_bytes,
+                  const std::string& name) {
+    const Imath::Box2i window = header.dataWindow();
+    const std::int64_t width = std::int64_t{window.max.x} - window.min.x + 1,
+                       height = std::int64_t{window.max.y} - window.min.y + 1;
+    const std::string size = std::to_string(width) + " x " + std::to_string(height) +
+                             " pixels of " + std::to_string(n_channels) + " channels";
+    if (width < 1 || height < 1 || n_channels < 1)
+        throw Error(Fault::bad_input, name + ": " + size + " are no picture; save it again");
+    if (height > static_cast<std::int64_t>(kMaxSamples) / width ||
+        n_channels > kMaxSamples / static_cast<std::size_t>(width * height))
+        throw Error(Fault::bad_input,
+                    name + ": " + size + ", at most 2^28 samples are read; reduce it");
+    const auto n_samples = static_cast<std::size_t>(width * height) * n_channels;
+    if (2 * n_samples / kMaxDeflateRatio > n_bytes) // half floats have two bytes
+        throw Error(Fault::bad_input, name + ": " + size + " cannot come out of " +
+                                          std::to_string(n_bytes) +
+                                          " bytes; the file is cut short or forged");
+    return {static_cast<int>(width), static_cast<int>(height), static_cast<int>(n_channels)};
+}
+
+} // namespace
+
+void write_exr(const std::filesystem::path& path, const ExrImage& exr) {
+    const Image& image = exr.image;
+    std::vector<std::string> sorted = exr.channels;
+    std::sort(sorted.begin(), sorted.end());
+    if (image.width < 1 || image.height < 1 || image.channels < 1 ||
+        sorted.size() != static_cast<std::size_t>(image.channels) || sorted.front().empty() ||
+        std::adjacent_find(sorted.begin(), sorted.end()) != sorted.end() ||
+        image.pixels.size() != static_cast<std::size_t>(image.width) *
+                                   static_cast<std::size_t>(image.height) * sorted.size())
+        throw Error(Fault::bad_argument,
+                    base_name(path) + ": " + std::to_string(image.width) + " x " +
+                        std::to_string(image.height) + " pixels with " +
+                        std::to_string(sorted.size()) + " names of channels and " +
+                        std::to_string(image.pixels.size()) +
+                        " numbers are no picture; give each channel a name of its own");
+    StringOutput stream;
+    try {
+        Imf::Header header(image.width, image.height);
+        header.compression() = Imf::ZIP_COMPRESSION;
+        for (const auto& [key, value] : exr.attributes)
+            header.insert(key, Imf::StringAttribute(value));
+        for (const std::string& name : exr.channels)
+            header.channels().insert(name, Imf::Channel(Imf::FLOAT));
+        Imf::OutputFile file(stream, header);
+        file.setFrameBuffer(frame_of(const_cast<Image&>(image), exr.channels, {0, 0})); // it reads
+        file.writePixels(image.height);
+    } catch (const std::exception& e) {
+        throw Error(Fault::bad_argument, base_name(path) + ": OpenEXR refuses: " + e.what());
+    }
+    write_file(path, stream.bytes);
+}
+
+ExrImage read_exr(const std::filesystem::path& path, std::span<const std::string> channels) {
+    const std::string bytes = read_file(path);
+    const std::string name = base_name(path);
+    HeaderWalk(bytes, name).check();
+    try {
+        StringInput stream(bytes);
+        Imf::InputFile file(stream);
+        const Imf::Header& header = file.header();
+        if (header.compression() == Imf::DWAA_COMPRESSION ||
+            header.compression() == Imf::DWAB_COMPRESSION)
+            throw Error(Fault::unsupported, name + ": DWA compression is lossy; save it with ZIP");
+        ExrImage out;
+        out.channels = chosen(header.channels(), channels, name);
+        out.image = empty_image(header, out.channels.size(), bytes.size(), name);
+        for (auto it = header.begin(); it != header.end(); ++it)
+            if (const auto* text = dynamic_cast<const Imf::StringAttribute*>(&it.attribute()))
+                out.attributes.emplace_back(it.name(), text->value());
+        const Imath::Box2i window = header.dataWindow();
+        file.setFrameBuffer(frame_of(out.image, out.channels, window.min));
+        file.readPixels(window.min.y, window.max.y);
+        return out;
+    } catch (const Error&) {
+        throw;
+    } catch (const std::exception& e) {
+        throw Error(Fault::bad_input,
+                    name + ": damaged EXR: " + printable(e.what(), 200) + "; save it again as EXR");
+    }
+}
+
+} // namespace taihu

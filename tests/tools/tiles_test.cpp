@@ -1,0 +1,119 @@
+// Tiles, estimates and refusals through the program.
+#include <string>
+
+#include <gmock/gmock.h>
+#include <nlohmann/json.hpp>
+
+#include "stats/core/file.h"
+#include "tests/support/grids.h"
+#include "tests/support/process.h"
+#include "vdb_ops/tiles.h"
+#include "vdb_ops/vdb_file.h"
+
+namespace taihu {
+namespace {
+
+using nlohmann::json;
+using testing::HasSubstr;
+
+json must(const std::string& command, const Scratch& folder) {
+    const Finished said = run(command, folder.path());
+    EXPECT_EQ(said.exit_code, 0) << command << "\n" << said.err;
+    return said.out.empty() ? json() : json::parse(said.out);
+}
+
+std::string whole_hash(const std::filesystem::path& file) {
+    return grid_hash(*read_vdb(file).solid);
+}
+
+std::string tiles_hash(const std::filesystem::path& folder) {
+    return grid_hash(*read_tiles(folder / kTileSetName));
+}
+
+TEST(TileCommands, ARecipeInTilesIsTheWhole) {
+    const Scratch folder;
+    const std::string rock = "taihu rock --preset taihu --dim 150 --height 1.8m --seed 7 ";
+    must(rock + "-o whole.vdb -q", folder);
+    const json made = must(rock + "--tiles 128 -o tiles --json -q", folder);
+    EXPECT_GT(made["tiles"], 1);
+    EXPECT_GT(made["bubbles_filled"], 0);
+    EXPECT_EQ(tiles_hash(folder / "tiles"), whole_hash(folder / "whole.vdb"));
+    const json info = must("taihu info tiles/tiles.json --json", folder);
+    EXPECT_EQ(info["kind"], "level set in tiles");
+    EXPECT_EQ(info["recipe"], must("taihu info whole.vdb --json", folder)["recipe"]);
+    const std::string tile = read_tile_set(folder / "tiles" / kTileSetName).tiles[0].file;
+    const json one = must("taihu info tiles/" + tile + " --json", folder);
+    EXPECT_EQ(one["kind"], "tile of a level set");
+    EXPECT_EQ(one["tile"]["of"], "tiles.json");
+    // By itself it is a closed solid.
+    must("taihu mesh tiles/" + tile + " -o tile.ply -q", folder);
+    EXPECT_GT(must("taihu measure tiles/" + tile + " --json", folder)["volume_m3"], 0);
+}
+
+TEST(TileCommands, HolesCarvedInTilesAreThoseOfTheWhole) {
+    const Scratch folder;
+    must("taihu shape sphere --dim 150 -o base.vdb -q", folder);
+    write_file(folder / "holes.csv",
+               "x_m,y_m,z_m,radius_m\n0,0,0,0.2\n0.4,0.1,0,0.15\n0,0,0.5,0.3\n");
+    must("taihu carve base.vdb --holes holes.csv -o whole.vdb -q", folder);
+    must("taihu carve base.vdb --holes holes.csv --tiles 128 -o tiles -q", folder);
+    EXPECT_EQ(tiles_hash(folder / "tiles"), whole_hash(folder / "whole.vdb"));
+    const Finished clash =
+        run("taihu carve base.vdb --holes holes.csv --tiles 128 -o whole.vdb", folder.path());
+    EXPECT_THAT(clash.err, HasSubstr("needs the name of a folder"));
+    const Finished kept = run(
+        "taihu carve base.vdb --holes holes.csv --tiles 128 -o tiles --no-clobber", folder.path());
+    EXPECT_THAT(kept.err, HasSubstr("tiles.json: exists"));
+}
+
+TEST(TileCommands, WhatDoesNotFitIsRefusedWithTheVoxelThatDoes) {
+    const Scratch folder;
+    must("taihu shape sphere --dim 300 -o base.vdb -q", folder);
+    write_file(folder / "holes.csv", "x_m,y_m,z_m,radius_m\n0.4,0.1,0,0.15\n");
+    write_file(folder / "r.json",
+               R"({"taihu_recipe": 1, "dim": 300, "solid": {"sphere": {"size_m": [1, 1, 1]}}})");
+    for (const std::string command :
+         {"taihu rock r.json -o a.vdb", "taihu carve base.vdb --holes holes.csv -o a.vdb",
+          "taihu shape sphere --dim 300 -o a.vdb"}) {
+        const Finished refused = run(command + " -q --memory 60MB", folder.path());
+        EXPECT_EQ(refused.exit_code, 1) << command;
+        EXPECT_THAT(refused.err, HasSubstr("refused: voxel size 0.00333 m would need about"));
+        EXPECT_THAT(refused.err, HasSubstr("(limit 60 MB); smallest that fits: 0.0"));
+        EXPECT_FALSE(std::filesystem::exists(folder / "a.vdb"));
+        must(command + " -q --memory 2GB", folder);
+        std::filesystem::remove(folder / "a.vdb");
+    }
+    const json dry = must("taihu rock r.json --dry-run --memory 60MB --json -q", folder);
+    EXPECT_EQ(dry["fits"], false);
+    // Leaves of a ball of radius r voxels: about 0.033 times 4 pi r^2.
+    EXPECT_NEAR(dry["leaves"].get<double>(), 0.033 * 4 * 3.1416 * 150 * 150, 1500);
+}
+
+TEST(TileCommands, NecksAreCutAndTheRecipeSaysSo) {
+    const Scratch folder;
+    write_file(folder / "r.json",
+               R"({"taihu_recipe": 1, "dim": 120, "solid": {"union": {"of": [
+                   {"sphere": {"size_m": [1, 1, 1]}},
+                   {"transform": {"of": {"sphere": {"size_m": [0.6, 0.6, 0.6]}}, "move_m": [1.1, 0, 0]}},
+                   {"box": {"size_m": [2, 0.1, 0.1]}}]}}})");
+    must("taihu rock r.json -o base.vdb -q", folder);
+    write_file(folder / "holes.csv", "x_m,y_m,z_m,radius_m\n-0.5,0.1,0,0.15\n");
+    const std::string carve = "taihu carve base.vdb --holes holes.csv -q --json ";
+    EXPECT_EQ(must(carve + "-o a.vdb", folder)["necked"], 0);
+    const json cut = must(carve + "--min-neck 20cm -o b.vdb", folder);
+    EXPECT_EQ(cut["necked"], 1);
+    EXPECT_GT(cut["necked_m3"].get<double>(), 0.1); // pi / 6 * 0.6^3 = 0.113
+    must("taihu rock --from b.vdb -o again.vdb -q", folder);
+    EXPECT_EQ(read_file(folder / "again.vdb"), read_file(folder / "b.vdb"));
+    const json stands = must(carve + "--foot 15 -o d.vdb", folder);
+    EXPECT_GE(stands["foot"]["tilt_deg"].get<double>(), 15);
+    EXPECT_GT(stands["foot"]["cut_m"].get<double>(), 0);
+    must("taihu rock --from d.vdb -o again.vdb -q", folder);
+    EXPECT_EQ(read_file(folder / "again.vdb"), read_file(folder / "d.vdb"));
+    const Finished all = run(carve + "--pieces all --min-neck 20cm -o c.vdb", folder.path());
+    EXPECT_EQ(all.exit_code, 2);
+    EXPECT_THAT(all.err, HasSubstr("how many pieces stay"));
+}
+
+} // namespace
+} // namespace taihu

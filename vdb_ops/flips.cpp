@@ -1,0 +1,360 @@
+#include "vdb_ops/flips_detail.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <memory>
+#include <numeric>
+#include <set>
+
+#include <tbb/parallel_for.h>
+
+#include "stats/core/error.h"
+#include "vdb_ops/kernels_detail.h"
+#include "vdb_ops/rasterize.h"
+
+namespace taihu {
+namespace {
+
+using openvdb::Coord;
+using openvdb::CoordBBox;
+using Leaf = openvdb::FloatTree::LeafNodeType;
+using TopNode = openvdb::FloatTree::RootNodeType::ChildNodeType; // 4096^3 voxels
+using Node = TopNode::ChildNodeType;                             // 128^3 voxels, 16^3 leaves
+using MaskNode = openvdb::MaskTree::RootNodeType::ChildNodeType::ChildNodeType;
+using MaskAccessor = openvdb::tree::ValueAccessor<const openvdb::MaskTree>;
+
+int reach_vox(float half_width_vox) {
+    return static_cast<int>(std::ceil(half_width_vox)) + 2;
+}
+
+/// A place where a grid edge crosses the surface, in voxels from a leaf's first.
+using Crossing = std::array<float, 3>;
+
+/// squared[512] = the least squared distance [voxels^2] from each voxel of a leaf to `points`, at
+/// most that of `far`. Rows farther than that are skipped.
+TAIHU_CLONES
+void nearest_squared(const Crossing* points, std::size_t n, float far, float* squared) {
+    const float far2 = far * far;
+    for (int v = 0; v < 512; ++v)
+        squared[v] = far2;
+    for (std::size_t i = 0; i < n; ++i) {
+        float dz2[8];
+        for (int z = 0; z < 8; ++z) {
+            const float dz = points[i][2] - static_cast<float>(z);
+            dz2[z] = dz * dz;
+        }
+        for (int x = 0; x < 8; ++x) {
+            const float dx = points[i][0] - static_cast<float>(x);
+            for (int y = 0; y < 8; ++y) {
+                const float dy = points[i][1] - static_cast<float>(y);
+                const float row = dx * dx + dy * dy;
+                if (row >= far2)
+                    continue;
+                float* out = squared + 64 * x + 8 * y;
+                for (int z = 0; z < 8; ++z)
+                    out[z] = row + dz2[z] < out[z] ? row + dz2[z] : out[z];
+            }
+        }
+    }
+}
+
+/// A leaf and its surroundings after the choice, as far as the band reaches.
+class Neighbourhood {
+public:
+    Neighbourhood(const openvdb::FloatGrid::ConstAccessor& values, const MaskAccessor& mask,
+                  const Coord& leaf, int reach)
+        : reach_(reach), size_(8 + 2 * reach),
+          old_(static_cast<std::size_t>(size_ * size_ * size_)), flipped_(old_.size()) {
+        const Coord lo = leaf.offsetBy(-reach), hi = leaf.offsetBy(7 + reach);
+        for (int x = lo.x() >> 3; x <= hi.x() >> 3; ++x)
+            for (int y = lo.y() >> 3; y <= hi.y() >> 3; ++y)
+                for (int z = lo.z() >> 3; z <= hi.z() >> 3; ++z)
+                    copy_block(values, mask, Coord(x, y, z) << 3, lo, hi);
+        if (any_flipped_)
+            find_crossings();
+    }
+
+    bool any_flipped() const { return any_flipped_; }
+    float old(int x, int y, int z) const { return old_[index(x + reach_, y + reach_, z + reach_)]; }
+    bool flipped(int x, int y, int z) const {
+        return flipped_[index(x + reach_, y + reach_, z + reach_)] != 0;
+    }
+    /// Where the surface that stays, and the one that goes, cross the edges of the grid.
+    const std::vector<Crossing>& staying() const { return staying_; }
+    const std::vector<Crossing>& going() const { return going_; }
+    /// New surface, where a cut goes through what was on one side.
+    const std::vector<Crossing>& cut() const { return cut_; }
+
+private:
+    std::size_t index(int x, int y, int z) const {
+        return static_cast<std::size_t>((x * size_ + y) * size_ + z);
+    }
+    void copy_block(const openvdb::FloatGrid::ConstAccessor& values, const MaskAccessor& mask,
+                    const Coord& block, const Coord& lo, const Coord& hi) {
+        const Leaf* leaf = values.probeConstLeaf(block);
+        const auto* bits = mask.probeConstLeaf(block);
+        const float value = leaf ? 0 : values.getValue(block);
+        const bool on = !bits && mask.isValueOn(block);
+        CoordBBox box(block, block.offsetBy(7));
+        box.intersect(CoordBBox(lo, hi));
+        for (auto at = box.begin(); at != box.end(); ++at) {
+            const Coord from = *at - lo;
+            const std::size_t i = index(from.x(), from.y(), from.z());
+            old_[i] = leaf ? leaf->getValue(*at) : value;
+            flipped_[i] = bits ? bits->isValueOn(*at) : on;
+            any_flipped_ |= flipped_[i] != 0;
+        }
+    }
+    void find_crossings() {
+        const std::size_t strides[3] = {index(1, 0, 0), index(0, 1, 0), 1};
+        for (int x = 0; x < size_; ++x)
+            for (int y = 0; y < size_; ++y)
+                for (int z = 0; z < size_; ++z) {
+                    const int at[3] = {x, y, z};
+                    const std::size_t p = index(x, y, z);
+                    for (std::size_t axis = 0; axis < 3; ++axis) {
+                        if (at[axis] + 1 == size_)
+                            continue;
+                        const std::size_t q = p + strides[axis];
+                        const bool crossing = (old_[p] < 0) != (old_[q] < 0);
+                        if (!crossing && flipped_[p] == flipped_[q])
+                            continue;
+                        Crossing point = {static_cast<float>(x - reach_),
+                                          static_cast<float>(y - reach_),
+                                          static_cast<float>(z - reach_)};
+                        point[axis] += crossing ? old_[p] / (old_[p] - old_[q]) : 0.5f;
+                        (!crossing                    ? cut_
+                         : flipped_[p] || flipped_[q] ? going_
+                                                      : staying_)
+                            .push_back(point);
+                    }
+                }
+    }
+
+    int reach_, size_;
+    bool any_flipped_ = false;
+    std::vector<float> old_;
+    std::vector<char> flipped_;
+    std::vector<Crossing> staying_, going_, cut_;
+};
+
+/// Rebuild the values of one leaf whose surroundings changed.
+void rebuild_leaf(Leaf& leaf, const Neighbourhood& near, float half_width, float voxel) {
+    const float background = half_width * voxel;
+    // Looked for a voxel beyond the band: crossings of edges are a little farther than the
+    // surface.
+    const float far = half_width + 1;
+    alignas(64) float staying[512], going[512], cut[512];
+    nearest_squared(near.staying().data(), near.staying().size(), far, staying);
+    nearest_squared(near.going().data(), near.going().size(), far, going);
+    nearest_squared(near.cut().data(), near.cut().size(), far, cut);
+    for (int v = 0; v < 512; ++v) {
+        const int x = v / 64, y = v / 8 % 8, z = v % 8;
+        const float old = near.old(x, y, z);
+        const bool flipped = near.flipped(x, y, z);
+        const bool by_cut = cut[v] < staying[v];
+        if (!flipped && !by_cut && std::fabs(old) >= background)
+            continue;
+        // The nearest surface stays: its exact distance is better than the one rebuilt.
+        if (!flipped && !by_cut && going[v] >= staying[v])
+            continue;
+        const float value = std::min(std::sqrt(std::min(staying[v], cut[v])) * voxel, background);
+        const auto offset = static_cast<openvdb::Index>(v);
+        leaf.setValueOnly(offset, (old < 0) != flipped ? -value : value);
+        leaf.setActiveState(offset, value < background);
+    }
+}
+
+/// The leaves and tiles of a node of 128^3 voxels, some of them flipped.
+class Flipper {
+public:
+    Flipper(const openvdb::FloatGrid& grid, const openvdb::MaskTree& mask, const CoordBBox& region,
+            Flipped what)
+        : grid_(grid), mask_(mask), region_(region), what_(what), lattice_(lattice_of(grid)),
+          reach_(flip_reach_blocks(lattice_.half_width_vox)) {}
+
+    /// Null, and whether it lies inside, where the node comes out uniform.
+    std::unique_ptr<Node> node(const Coord& origin, bool& inside) const {
+        const auto values = grid_.getConstAccessor();
+        const MaskAccessor mask(mask_);
+        auto node = std::make_unique<Node>(origin, grid_.background(), false);
+        openvdb::Index n_inside = 0, n_leaves = 0;
+        for (openvdb::Index place = 0; place < Node::NUM_VALUES; ++place) {
+            const Coord at = node->offsetToGlobalCoord(place);
+            if (!region_.isInside(at))
+                continue;
+            std::unique_ptr<Leaf> leaf = this->leaf(values, mask, at);
+            const bool is_inside =
+                leaf ? leaf->getValue(0) < 0 : (values.getValue(at) < 0) != mask.isValueOn(at);
+            if (leaf && !leaf->isEmpty()) {
+                node->addChild(leaf.release());
+                ++n_leaves;
+            } else if (is_inside) {
+                node->addTile(place, -grid_.background(), false);
+                ++n_inside;
+            }
+        }
+        inside = n_inside == Node::NUM_VALUES;
+        return n_leaves == 0 && (n_inside == 0 || inside) ? nullptr : std::move(node);
+    }
+
+private:
+    /// The leaf at `origin`, rebuilt where something changes near it; null without either.
+    std::unique_ptr<Leaf> leaf(const openvdb::FloatGrid::ConstAccessor& values,
+                               const MaskAccessor& mask, const Coord& origin) const {
+        const Leaf* old = values.probeConstLeaf(origin);
+        if ((!old && what_ == Flipped::parts) || !any_near(mask, origin))
+            return old ? std::make_unique<Leaf>(*old) : nullptr;
+        // A cut through uniform blocks leaves a surface in them.
+        auto leaf = old ? std::make_unique<Leaf>(*old)
+                        : std::make_unique<Leaf>(origin, values.getValue(origin), false);
+        const Neighbourhood near(values, mask, origin, reach_vox(lattice_.half_width_vox));
+        if (near.any_flipped())
+            rebuild_leaf(*leaf, near, lattice_.half_width_vox,
+                         static_cast<float>(lattice_.voxel_m));
+        return leaf;
+    }
+
+    bool any_near(const MaskAccessor& mask, const Coord& origin) const {
+        for (int x = -reach_; x <= reach_; ++x)
+            for (int y = -reach_; y <= reach_; ++y)
+                for (int z = -reach_; z <= reach_; ++z) {
+                    const Coord block = origin.offsetBy(8 * x, 8 * y, 8 * z);
+                    if (mask.probeConstLeaf(block) || mask.isValueOn(block))
+                        return true;
+                }
+        return false;
+    }
+
+    const openvdb::FloatGrid& grid_;
+    const openvdb::MaskTree& mask_;
+    CoordBBox region_;
+    Flipped what_;
+    Lattice lattice_;
+    int reach_;
+};
+
+/// The nodes of 128^3 voxels in which something may lie inside, in order.
+std::vector<Coord> nodes_of(const openvdb::FloatTree& tree, const openvdb::MaskTree& mask) {
+    std::set<Coord> origins;
+    for (auto top = tree.root().cbeginChildOn(); top; ++top)
+        for (openvdb::Index i = 0; i < TopNode::NUM_VALUES; ++i)
+            if (top->isChildMaskOn(i) || top->getTable()[i].getValue() < 0)
+                origins.insert(top->offsetToGlobalCoord(i));
+    std::vector<const MaskNode*> masked;
+    mask.getNodes(masked);
+    for (const MaskNode* node : masked)
+        origins.insert(node->origin());
+    return {origins.begin(), origins.end()};
+}
+
+std::vector<std::uint32_t> roots(std::size_t n) {
+    std::vector<std::uint32_t> parent(n);
+    std::iota(parent.begin(), parent.end(), 0u);
+    return parent;
+}
+
+std::uint32_t find(std::vector<std::uint32_t>& parent, std::uint32_t p) {
+    while (parent[p] != p)
+        p = parent[p] = parent[parent[p]];
+    return p;
+}
+
+/// Solid parts, those that stay first.
+std::vector<std::uint32_t> ranked(const std::vector<Components::Part>& parts,
+                                  const std::vector<char>& kept) {
+    std::vector<std::uint32_t> solids;
+    for (std::uint32_t p = 0; p < parts.size(); ++p)
+        if (parts[p].solid)
+            solids.push_back(p);
+    const auto is_kept = [&](std::uint32_t p) { return !kept.empty() && kept[p] != 0; };
+    const auto before = [&](std::uint32_t a, std::uint32_t b) {
+        if (is_kept(a) != is_kept(b))
+            return is_kept(a);
+        if (parts[a].n_voxels != parts[b].n_voxels)
+            return parts[a].n_voxels > parts[b].n_voxels;
+        const Coord first = parts[a].first >> 3, second = parts[b].first >> 3;
+        return first != second ? first < second : parts[a].first < parts[b].first;
+    };
+    std::sort(solids.begin(), solids.end(), before);
+    return solids;
+}
+
+} // namespace
+
+CleanChoice choose_parts(const std::vector<Components::Part>& parts,
+                         const std::vector<Components::Contact>& contacts,
+                         const CleanSettings& settings, const std::vector<char>& kept) {
+    const std::vector<std::uint32_t> solids = ranked(parts, kept);
+    if (solids.empty())
+        throw Error(Fault::bad_input,
+                    "clean: nothing is left of the solid; use fewer or smaller holes");
+    CleanChoice choice;
+    choice.removed.assign(parts.size(), 0);
+    choice.filled.assign(parts.size(), 0);
+    choice.counts.n_pieces = solids.size();
+    std::size_t n_stay = settings.n_pieces.value_or(solids.size());
+    if (!kept.empty())
+        n_stay = static_cast<std::size_t>(std::count(kept.begin(), kept.end(), 1));
+    for (std::size_t i = n_stay; i < solids.size(); ++i) {
+        choice.removed[solids[i]] = 1;
+        ++choice.counts.n_pieces_removed;
+    }
+    // A removed piece is void: it joins the voids that it touches.
+    std::vector<std::uint32_t> parent = roots(parts.size());
+    for (const auto& [solid, empty] : contacts)
+        if (choice.removed[solid]) {
+            const std::uint32_t a = find(parent, solid), b = find(parent, empty);
+            parent[std::max(a, b)] = std::min(a, b);
+        }
+    for (std::uint32_t p = 1; p < parts.size(); ++p) {
+        if (parts[p].solid && !choice.removed[p])
+            continue;
+        const std::uint32_t root = find(parent, p);
+        choice.counts.n_bubbles += root == p;
+        choice.filled[p] = settings.fill_bubbles && root != Components::kOutside;
+    }
+    choice.counts.n_bubbles_filled = settings.fill_bubbles ? choice.counts.n_bubbles : 0;
+    return choice;
+}
+
+int flip_reach_blocks(float half_width_vox) {
+    return (reach_vox(half_width_vox) + 7) / 8;
+}
+
+openvdb::FloatGrid::Ptr flip(const openvdb::FloatGrid& grid, const openvdb::MaskTree& mask,
+                             const openvdb::CoordBBox& region, Progress* progress, Flipped what) {
+    const Flipper flipper(grid, mask, region, what);
+    const std::vector<Coord> origins = nodes_of(grid.tree(), mask);
+    std::vector<std::unique_ptr<Node>> nodes(origins.size());
+    std::vector<char> inside(origins.size(), 0);
+    tbb::parallel_for(std::size_t{0}, origins.size(), [&](std::size_t i) {
+        check_cancelled(progress);
+        if (!region.hasOverlap(CoordBBox::createCube(origins[i], static_cast<int>(Node::DIM))))
+            return;
+        bool uniform_inside = false;
+        nodes[i] = flipper.node(origins[i], uniform_inside);
+        inside[i] = uniform_inside;
+    });
+    auto result = openvdb::FloatGrid::create(grid.background());
+    result->setTransform(grid.transform().copy());
+    result->setGridClass(openvdb::GRID_LEVEL_SET);
+    auto& root = result->tree().root();
+    for (std::size_t i = 0; i < origins.size(); ++i) {
+        if (!nodes[i] && !inside[i])
+            continue;
+        auto* top = root.probeNode<TopNode>(origins[i]);
+        if (!top) {
+            top = new TopNode(origins[i], grid.background(), false);
+            root.addChild(top);
+        }
+        if (nodes[i])
+            top->addChild(nodes[i].release());
+        else
+            top->addTile(TopNode::coordToOffset(origins[i]), -grid.background(), false);
+    }
+    return result;
+}
+
+} // namespace taihu
