@@ -23,6 +23,7 @@ bool load(const openvdb::FloatTree& tree, CellBlock& block) {
         const Coord shift((part >> 2) * kBlock, (part >> 1 & 1) * kBlock, (part & 1) * kBlock);
         const Coord origin = block.origin + shift;
         const Leaf* leaf = tree.probeConstLeaf(origin);
+        const float* values = leaf ? leaf->buffer().data() : nullptr;
         const bool tile = !leaf && tree.getValue(origin) < 0;
         if (!leaf && !tile)
             continue;
@@ -31,9 +32,7 @@ bool load(const openvdb::FloatTree& tree, CellBlock& block) {
         for (int x = 0; x < end.x(); ++x)
             for (int y = 0; y < end.y(); ++y)
                 for (int z = 0; z < end.z(); ++z) {
-                    const bool in =
-                        leaf ? leaf->getValue(static_cast<openvdb::Index>((x * 8 + y) * 8 + z)) < 0
-                             : tile;
+                    const bool in = values ? values[(x * 8 + y) * 8 + z] < 0 : tile;
                     const auto i = static_cast<unsigned>(((x + shift.x()) * 9 + y + shift.y()) * 9 +
                                                          z + shift.z());
                     block.inside[i / 64] |= std::uint64_t{in} << (i % 64);
@@ -134,13 +133,15 @@ std::optional<CellRef> CellBlocks::cell(std::size_t block, const Coord& c) const
 }
 
 bool is_passed(const CellBlock& block, const Coord& first, int size) {
-    const bool one = block.in(first);
+    const unsigned along_z = (2u << size) - 1;
+    unsigned any = 0, all = along_z;
     for (int x = 0; x <= size; ++x)
-        for (int y = 0; y <= size; ++y)
-            for (int z = 0; z <= size; ++z)
-                if (block.in(first.x() + x, first.y() + y, first.z() + z) != one)
-                    return true;
-    return false;
+        for (int y = 0; y <= size; ++y) {
+            const unsigned row = block.row(first.x() + x, first.y() + y) >> first.z();
+            any |= row & along_z;
+            all &= row;
+        }
+    return any != 0 && all != along_z;
 }
 
 bool is_simple(const CellBlock& block, const Coord& first, int size) {

@@ -26,6 +26,14 @@ struct CellBlock {
         return (inside[i / 64] >> (i % 64) & 1) != 0;
     }
     bool in(const openvdb::Coord& c) const { return in(c.x(), c.y(), c.z()); }
+    /// The 9 corners along z.
+    unsigned row(int x, int y) const {
+        const auto i = static_cast<unsigned>((x * 9 + y) * 9);
+        std::uint64_t bits = inside[i / 64] >> (i % 64);
+        if (i % 64 > 55)
+            bits |= inside[i / 64 + 1] << (64 - i % 64);
+        return static_cast<unsigned>(bits & 0x1ff);
+    }
     /// The cell that voxel cell c of the block is part of: its first voxel cell, and its size.
     int size_at(const openvdb::Coord& c) const {
         if (fours >> ((c.x() / 4 * 2 + c.y() / 4) * 2 + c.z() / 4) & 1)

@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
+#include <span>
 
 #include <tbb/blocked_range.h>
 #include <tbb/parallel_for.h>
@@ -32,7 +34,7 @@ constexpr std::array<CellEdge, 12> kEdges = {{{0, 0, 0, 0},
 class BlockSizes {
 public:
     BlockSizes(CellBlock& block, const SurfacePoints& points, const CellSizeSettings& settings)
-        : block_(block), points_(points), settings_(settings), half_voxel_(0.5 * points.voxel_m()) {
+        : block_(block), points_(points), settings_(settings) {
         place_.fill(-1);
     }
 
@@ -129,21 +131,35 @@ private:
         Box cell;
         cell.include(points_.voxel(block_.origin + c));
         cell.include(points_.voxel(block_.origin + c.offsetBy(size)));
-        const Vec3 mean = mean_of(crossings);
-        const auto vertex = onto(points_.field(), labels, mean, size * points_.voxel_m());
-        if (!vertex || !cell.dilated(0.5 * half_voxel_ * size).contains(*vertex) ||
-            !points_.is_on(*vertex))
+        const LabelledPoint vertex = points_.place(crossings, cell, 0);
+        if (!(vertex.labels == labels) || !points_.is_on(vertex.point))
+            return false;
+        if (labels.size() == 2 && !rim_is_straight(labels, vertex.point, size, bound))
             return false;
         return std::all_of(crossings.begin(), crossings.end(), [&](const Crossing& x) {
-            const Vec3 middle = (x.point + *vertex) * 0.5;
+            const Vec3 middle = (x.point + vertex.point) * 0.5;
             return std::fabs(points_.field().at(middle).value_m) <= 0.5 * bound;
         });
+    }
+
+    /// Whether its tangent is near to it as far as the cell's faces.
+    bool rim_is_straight(const PrimitiveSet& labels, const Vec3& p, int size, double bound) const {
+        const FieldProbe& field = points_.field();
+        const double half = 0.5 * size * points_.voxel_m();
+        const Vec3 way =
+            normalized(cross(field.of(labels[0], p).gradient, field.of(labels[1], p).gradient));
+        for (const double by : {-half, half}) {
+            const Vec3 on_tangent = p + way * by;
+            const auto on_rim = onto(field, labels, on_tangent, half);
+            if (!on_rim || length(*on_rim - on_tangent) > bound)
+                return false;
+        }
+        return true;
     }
 
     CellBlock& block_;
     const SurfacePoints& points_;
     CellSizeSettings settings_;
-    double half_voxel_;
     std::array<std::int16_t, 1536> place_; ///< in found_, by key
     std::vector<Crossing> found_;
 };

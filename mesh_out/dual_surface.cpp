@@ -1,5 +1,8 @@
 #include "mesh_out/dual_surface_detail.h"
 
+#include <algorithm>
+#include <bit>
+
 #include <tbb/blocked_range.h>
 #include <tbb/parallel_for.h>
 
@@ -20,18 +23,34 @@ void each_block(std::size_t n, const Fn& fn) {
     });
 }
 
-/// Calls fn(cell) for the cells of a block that the surface passes.
+/// Calls fn(cell, corners) for the cells of a block that the surface passes, large ones where it
+/// passes the first of their voxel cells.
 template <class Fn>
 void each_cell(const CellBlock& block, std::uint32_t number, const Fn& fn) {
-    for (std::uint16_t i = 0; i < 512; ++i) {
-        const Coord c = CellBlocks::local(i);
-        const int size = block.size_at(c);
-        if (((c.x() | c.y() | c.z()) & (size - 1)) != 0)
-            continue;
-        const unsigned corners = block.corners(c, size);
-        if (corners != 0 && corners != 255)
-            fn(CellRef{number, i, static_cast<std::uint8_t>(size)}, corners);
-    }
+    std::uint64_t seen = 0; // large cells, by their first eighth
+    for (int x = 0; x < 8; ++x)
+        for (int y = 0; y < 8; ++y) {
+            const unsigned r00 = block.row(x, y), r01 = block.row(x, y + 1),
+                           r10 = block.row(x + 1, y), r11 = block.row(x + 1, y + 1);
+            const unsigned any = r00 | r01 | r10 | r11, all = r00 & r01 & r10 & r11;
+            unsigned passed = (any | any >> 1) & ~(all & all >> 1) & 0xff;
+            for (; passed != 0; passed &= passed - 1) {
+                const int z = std::countr_zero(passed);
+                const int size = block.size_at({x, y, z});
+                const Coord c(x & -size, y & -size, z & -size);
+                if (size > 1) {
+                    const std::uint64_t bit = std::uint64_t{1}
+                                              << ((c.x() / 2 * 4 + c.y() / 2) * 4 + c.z() / 2);
+                    if ((seen & bit) != 0)
+                        continue;
+                    seen |= bit;
+                }
+                const unsigned corners = block.corners(c, size);
+                if (corners != 0 && corners != 255)
+                    fn(CellRef{number, CellBlocks::number(c), static_cast<std::uint8_t>(size)},
+                       corners);
+            }
+        }
 }
 
 Coord along(int axis, int by) {
@@ -129,10 +148,8 @@ void DualSurface::number_vertices() {
     });
     for (const auto& block : found) {
         first_vertex_.push_back(static_cast<std::uint32_t>(cells_.size()));
-        for (const auto& [cell, loops] : block) {
+        for (const auto& [cell, loops] : block)
             cells_.insert(cells_.end(), static_cast<std::size_t>(loops), cell);
-            shared_.insert(shared_.end(), static_cast<std::size_t>(loops), loops > 1);
-        }
         if (cells_.size() >= 0xffffffffu)
             throw Error(Fault::unsupported,
                         "extract: the mesh would have 2^32 vertices or more; use a larger voxel");
@@ -175,14 +192,23 @@ bool DualSurface::polygon_across(std::uint32_t block, const Coord& voxel, int ax
 void DualSurface::make_polygons() {
     std::vector<std::vector<std::pair<Edge, DualPolygon>>> found(blocks_.size());
     each_block(blocks_.size(), [&](std::uint32_t b) {
-        DualPolygon polygon;
-        for (std::uint16_t i = 0; i < 512; ++i) {
-            const Coord voxel = CellBlocks::local(i);
-            for (int axis = 0; axis < 3; ++axis)
-                if (blocks_[b].in(voxel) != blocks_[b].in(voxel + along(axis, 1)) &&
-                    polygon_across(b, voxel, axis, polygon))
-                    found[b].push_back({{b, static_cast<std::uint16_t>(axis * 512 + i)}, polygon});
-        }
+        const auto take = [&](int x, int y, unsigned passed, int axis) {
+            for (passed &= 0xff; passed != 0; passed &= passed - 1) {
+                const Coord voxel(x, y, std::countr_zero(passed));
+                DualPolygon polygon;
+                if (polygon_across(b, voxel, axis, polygon))
+                    found[b].push_back(
+                        {{b, static_cast<std::uint16_t>(axis * 512 + CellBlocks::number(voxel))},
+                         polygon});
+            }
+        };
+        for (int x = 0; x < 8; ++x)
+            for (int y = 0; y < 8; ++y) {
+                const unsigned row = blocks_[b].row(x, y);
+                take(x, y, row ^ blocks_[b].row(x + 1, y), 0);
+                take(x, y, row ^ blocks_[b].row(x, y + 1), 1);
+                take(x, y, row ^ row >> 1, 2);
+            }
     });
     std::size_t n = 0;
     for (const auto& block : found)

@@ -32,8 +32,6 @@ public:
 
     std::size_t n_vertices() const { return cells_.size(); }
     const CellRef& cell(std::size_t vertex) const { return cells_[vertex]; }
-    /// Whether the surface passes that cell more than once.
-    bool shares_cell(std::size_t vertex) const { return shared_[vertex] != 0; }
     const std::vector<DualPolygon>& polygons() const { return polygons_; }
     /// The edge that polygon i stands across.
     const std::vector<Edge>& edges() const { return edges_; }
@@ -60,7 +58,6 @@ private:
     std::vector<std::array<std::uint16_t, 512>> local_vertex_;
     std::vector<std::uint32_t> first_vertex_; ///< of each block
     std::vector<CellRef> cells_;
-    std::vector<char> shared_;
     std::vector<DualPolygon> polygons_;
     std::vector<Edge> edges_;
 };

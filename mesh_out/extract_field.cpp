@@ -1,6 +1,8 @@
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <numeric>
+#include <span>
 #include <string>
 #include <tuple>
 
@@ -68,7 +70,7 @@ public:
         stage_.assign(surface_.n_vertices(), 0);
         each(surface_.n_vertices(), points_, progress_,
              [&](const SurfacePoints& points, std::size_t v) {
-                 const auto placed = points.place(crossings_of(v), cell_box(v), slack(v));
+                 const auto placed = points.place(crossings_of(v), cell_box(v), points.voxel_m());
                  mesh_.positions[v] = placed.point;
                  mesh_.labels[v] = placed.labels;
              });
@@ -79,6 +81,8 @@ public:
         for (std::size_t i = 0; i < surface_.polygons().size(); ++i)
             first_triangle_[i + 1] = first_triangle_[i] + surface_.polygons()[i].n - 2u;
         mesh_.triangles.resize(first_triangle_.back());
+        split_first_.assign(surface_.polygons().size(), 0);
+        turned_.assign(surface_.polygons().size(), 0);
         each(surface_.polygons().size(), points_, progress_,
              [&](const SurfacePoints& points, std::size_t i) { split(points, i); });
     }
@@ -87,31 +91,30 @@ public:
     /// that cannot be helped so are returned.
     std::vector<std::uint32_t> retreat() {
         constexpr int kMostRounds = 16;
-        std::vector<char> picked = doubtful();
+        std::vector<char> picked(mesh_.triangles.size(), 1);
         std::vector<std::uint32_t> hit;
         for (int round = 0; round < kMostRounds; ++round) {
-            hit = in_trouble(picked);
-            if (hit.empty())
+            std::vector<std::uint32_t> polygons; // that change
+            hit = in_trouble(picked, polygons);
+            if (hit.empty() && polygons.empty())
                 break;
-            if (std::all_of(hit.begin(), hit.end(),
-                            [&](std::uint32_t v) { return stage_[v] >= kLastStage; }))
+            if (polygons.empty() && std::all_of(hit.begin(), hit.end(), [&](std::uint32_t v) {
+                    return stage_[v] >= kLastStage;
+                }))
                 break;
+            std::fill(picked.begin(), picked.end(), 0);
+            pick(polygons, picked);
+            polygons.clear();
             each(hit.size(), points_, progress_,
                  [&](const SurfacePoints& points, std::size_t i) { step_back(points, hit[i]); });
-            std::vector<std::uint32_t> polygons;
             for (const std::uint32_t v : hit)
                 polygons.insert(polygons.end(), around_.begin() + first_[v],
                                 around_.begin() + first_[v + 1]);
             std::sort(polygons.begin(), polygons.end());
             polygons.erase(std::unique(polygons.begin(), polygons.end()), polygons.end());
-            std::fill(picked.begin(), picked.end(), 0);
             each(polygons.size(), points_, progress_,
-                 [&](const SurfacePoints& points, std::size_t i) {
-                     split(points, polygons[i]);
-                     for (auto t = first_triangle_[polygons[i]];
-                          t < first_triangle_[polygons[i] + 1]; ++t)
-                         picked[t] = 1;
-                 });
+                 [&](const SurfacePoints& points, std::size_t i) { split(points, polygons[i]); });
+            pick(polygons, picked);
         }
         return hit;
     }
@@ -119,8 +122,16 @@ public:
 private:
     static constexpr std::uint8_t kLastStage = 3;
 
-    std::vector<Crossing> crossings_of(std::size_t v) const {
-        std::vector<Crossing> all;
+    void pick(const std::vector<std::uint32_t>& polygons, std::vector<char>& picked) const {
+        for (const std::uint32_t p : polygons)
+            for (auto t = first_triangle_[p]; t < first_triangle_[p + 1]; ++t)
+                picked[t] = 1;
+    }
+
+    /// Good until the same thread asks again.
+    std::span<const Crossing> crossings_of(std::size_t v) const {
+        thread_local std::vector<Crossing> all;
+        all.clear();
         for (std::size_t k = first_[v]; k < first_[v + 1]; ++k)
             all.push_back(crossings_[around_[k]]);
         return all;
@@ -133,112 +144,165 @@ private:
         box.include(points_.voxel(at.offsetBy(cell.size)));
         return box;
     }
-    double slack(std::size_t v) const {
-        return points_.voxel_m() * (surface_.cell(v).size == 1 ? 1.0 : 0.5);
-    }
 
+    /// Into the cell, if it is outside; off the rim; to the middle of the crossings.
     void step_back(const SurfacePoints& points, std::uint32_t v) {
-        Vec3& p = mesh_.positions[v];
         const Box cell = cell_box(v);
-        stage_[v] = static_cast<std::uint8_t>(std::min<int>(stage_[v] + 1, kLastStage));
-        if (stage_[v] == 1) {
-            p = held(p, cell);
-            mesh_.labels[v] = points.label(p);
-            return;
-        }
-        const Vec3 mean = mean_of(crossings_of(v));
-        if (stage_[v] == 2) {
-            const LabelledPoint on = points.on_face(held(p, cell), cell);
-            p = on.point;
-            mesh_.labels[v] = on.labels;
+        LabelledPoint p{mesh_.positions[v], mesh_.labels[v]};
+        if (stage_[v] == 0 && !cell.contains(p.point)) {
+            stage_[v] = 1;
+            p = points.back_in(p, cell);
+        } else if (const Vec3 mean = mean_of(crossings_of(v));
+                   stage_[v] < 2 && p.labels.size() > 1) {
+            stage_[v] = 2;
+            p = points.on_face(mean, cell);
         } else {
-            p = mean;
-            mesh_.labels[v] = points.label(p);
+            stage_[v] = kLastStage;
+            p = {mean, points.label(mean)};
         }
+        mesh_.positions[v] = p.point;
+        mesh_.labels[v] = p.labels;
     }
 
     void split(const SurfacePoints& points, std::size_t i) {
         const DualPolygon& polygon = surface_.polygons()[i];
+        write_split(i,
+                    polygon.n == 3 || along_first(points, polygon.vertices, crossings_[i].normal));
+    }
+    void write_split(std::size_t i, bool along_first) {
+        const auto& v = surface_.polygons()[i].vertices;
         Triangle* out = &mesh_.triangles[first_triangle_[i]];
-        const auto& v = polygon.vertices;
-        if (polygon.n == 3) {
-            out[0] = {v[0], v[1], v[2]};
-        } else if (along_first(points, v)) {
-            out[0] = {v[0], v[1], v[2]};
-            out[1] = {v[0], v[2], v[3]};
-        } else {
-            out[0] = {v[1], v[2], v[3]};
-            out[1] = {v[1], v[3], v[0]};
-        }
+        split_first_[i] = along_first;
+        out[0] = along_first ? Triangle{v[0], v[1], v[2]} : Triangle{v[1], v[2], v[3]};
+        if (surface_.polygons()[i].n == 4)
+            out[1] = along_first ? Triangle{v[0], v[2], v[3]} : Triangle{v[1], v[3], v[0]};
     }
 
-    /// Whether to split a quad from its first corner to the third: along a rim, or where the
-    /// diagonal is nearer to the surface, but not so that a triangle turns over.
-    bool along_first(const SurfacePoints& points, const std::array<std::uint32_t, 4>& v) const {
+    /// Splits the quads of two triangles that cross along other diagonals, if that helps; once
+    /// each.
+    bool untangle(const std::array<std::uint32_t, 2>& pair, std::vector<std::uint32_t>& changed) {
+        std::array<std::size_t, 2> of;
+        for (std::size_t k = 0; k < 2; ++k)
+            of[k] = static_cast<std::size_t>(
+                std::upper_bound(first_triangle_.begin(), first_triangle_.end(), pair[k]) -
+                first_triangle_.begin() - 1);
+        const std::array<bool, 2> was = {split_first_[of[0]] != 0, split_first_[of[1]] != 0};
+        const auto may_turn = [&](std::size_t k) {
+            return surface_.polygons()[of[k]].n == 4 && !turned_[of[k]];
+        };
+        for (const unsigned which : {1u, 2u, 3u}) {
+            if ((which & 1 && !may_turn(0)) || (which & 2 && !may_turn(1)) ||
+                (of[0] == of[1] && which != 1))
+                continue;
+            for (std::size_t k = 0; k < 2; ++k)
+                write_split(of[k], was[k] != ((which >> (of[0] == of[1] ? 0 : k) & 1) != 0));
+            if (!cross_each_other(of[0], of[1])) {
+                for (std::size_t k = 0; k < 2; ++k)
+                    turned_[of[k]] = turned_[of[k]] || (which >> k & 1) != 0;
+                changed.insert(changed.end(), of.begin(), of.end());
+                return true;
+            }
+        }
+        for (std::size_t k = 0; k < 2; ++k)
+            write_split(of[k], was[k]);
+        return false;
+    }
+    bool cross_each_other(std::size_t one, std::size_t other) const {
+        std::vector<std::uint32_t> all;
+        for (const std::size_t p : {one, other})
+            for (auto t = first_triangle_[p]; t < first_triangle_[p + 1]; ++t)
+                all.push_back(t);
+        std::sort(all.begin(), all.end());
+        all.erase(std::unique(all.begin(), all.end()), all.end());
+        for (std::size_t i = 0; i < all.size(); ++i) {
+            if (is_needle(mesh_.triangles[all[i]]))
+                return true;
+            for (std::size_t k = i + 1; k < all.size(); ++k)
+                if (!is_needle(mesh_.triangles[all[k]]) &&
+                    faces_cross(mesh_.positions, mesh_.triangles[all[i]], mesh_.triangles[all[k]]))
+                    return true;
+        }
+        return false;
+    }
+
+    /// Whether to split a quad from its first corner to the third: along a rim, or so that its
+    /// triangles face as the surface does; none of them may turn over.
+    /// \param normal  of the surface where the quad stands across an edge, or 0.
+    bool along_first(const SurfacePoints& points, const std::array<std::uint32_t, 4>& v,
+                     const Vec3& normal) const {
         const auto& l = mesh_.labels;
         const Vec3 a = mesh_.positions[v[0]], b = mesh_.positions[v[1]], c = mesh_.positions[v[2]],
                    d = mesh_.positions[v[3]];
-        const Vec3 n = cross(c - a, d - b);
-        const auto least = [&](const Vec3& p, const Vec3& q, const Vec3& r, const Vec3& s) {
+        // The smaller cosine to `n` of the triangles pqr and prs.
+        const auto least = [](const Vec3& p, const Vec3& q, const Vec3& r, const Vec3& s,
+                              const Vec3& n) {
             const Vec3 x = cross(q - p, r - p), y = cross(r - p, s - p);
             return std::min(dot(x, n) / std::max(length(x), 1e-300),
                             dot(y, n) / std::max(length(y), 1e-300));
         };
-        const double upright = 0.1 * length(n), first = least(a, b, c, d),
-                     second = least(b, c, d, a);
-        if (first < upright && second > first)
-            return false;
-        if (second < upright && first > second)
-            return true;
-        double ac = length(c - a), bd = length(d - b);
-        const bool rim = l[v[0]].size() != 1 ||
-                         !(l[v[0]] == l[v[1]] && l[v[1]] == l[v[2]] && l[v[2]] == l[v[3]]);
-        if (rim) {
+        // Three corners along one rim make no triangle worth the name.
+        const auto flatness = [](const Vec3& p, const Vec3& q, const Vec3& r) {
+            return length(cross(q - p, r - p)) /
+                   std::max({length_squared(q - p), length_squared(r - q), length_squared(p - r),
+                             1e-300});
+        };
+        const double wide = std::min(flatness(a, b, c), flatness(a, c, d)),
+                     wide_across = std::min(flatness(b, c, d), flatness(b, d, a));
+        constexpr double kWide = 0.05, kUpright = 0.1;
+        if (std::min(wide, wide_across) < kWide && wide != wide_across)
+            return wide > wide_across;
+        const Vec3 whole = normalized(cross(c - a, d - b));
+        const double first = least(a, b, c, d, whole), second = least(b, c, d, a, whole);
+        if (std::min(first, second) < kUpright && first != second)
+            return first > second;
+        const bool on_rim = l[v[0]].size() != 1 ||
+                            !(l[v[0]] == l[v[1]] && l[v[1]] == l[v[2]] && l[v[2]] == l[v[3]]);
+        if (on_rim) {
             const double voxel = points.voxel_m();
             const auto off = [&](const Vec3& p, const Vec3& q, const PrimitiveSet& common) {
+                const double favour = common.size() > 1 ? -0.05 : common.empty() ? 10 : 0;
                 return std::fabs(points.field().at((p + q) * 0.5).value_m) + 1e-3 * length(p - q) +
-                       (common.size() > 1 ? -0.05
-                        : common.empty()  ? 10.0
-                                          : 0.0) *
-                           voxel;
+                       favour * voxel;
             };
-            ac = off(a, c, l[v[0]].common(l[v[2]]));
-            bd = off(b, d, l[v[1]].common(l[v[3]]));
+            return off(a, c, l[v[0]].common(l[v[2]])) <= off(b, d, l[v[1]].common(l[v[3]]));
         }
-        return ac <= bd;
+        const double along = least(a, b, c, d, normal), across = least(b, c, d, a, normal);
+        constexpr double kAlike = 1e-6; // of cosines
+        return std::fabs(along - across) > kAlike ? along > across : length(c - a) <= length(d - b);
     }
 
-    /// Triangles that may cross others: at rims, outside of their cells, in cells that the surface
-    /// passes twice.
-    std::vector<char> doubtful() const {
-        std::vector<char> vertex(surface_.n_vertices()), picked(mesh_.triangles.size());
-        tbb::parallel_for(std::size_t{0}, vertex.size(), [&](std::size_t v) {
-            vertex[v] = mesh_.labels[v].size() != 1 || surface_.shares_cell(v) ||
-                        !cell_box(v).contains(mesh_.positions[v]);
-        });
-        tbb::parallel_for(std::size_t{0}, picked.size(), [&](std::size_t t) {
-            for (const std::uint32_t v : mesh_.triangles[t])
-                picked[t] = picked[t] || vertex[v];
-        });
-        return picked;
-    }
-
-    /// The vertices of triangles that cross, have no area, or two vertices in one place.
-    std::vector<std::uint32_t> in_trouble(const std::vector<char>& picked) const {
-        std::vector<std::uint32_t> hit = in_one_place();
-        const auto add = [&](std::size_t t) {
-            hit.insert(hit.end(), mesh_.triangles[t].begin(), mesh_.triangles[t].end());
-        };
-        for (std::size_t t = 0; t < mesh_.triangles.size(); ++t)
-            if (picked[t] && is_needle(mesh_.triangles[t]))
-                add(t);
-        for (const auto& pair : find_crossings(mesh_.positions, mesh_.triangles, picked)) {
-            add(pair[0]);
-            add(pair[1]);
-        }
+    /// The vertices to move of triangles that cross, have no area, or two vertices in one place.
+    /// \param turned  polygons that were split along their other diagonal instead.
+    std::vector<std::uint32_t> in_trouble(const std::vector<char>& picked,
+                                          std::vector<std::uint32_t>& turned) {
+        std::vector<std::uint32_t> hit;
+        std::vector<char> needle(mesh_.triangles.size());
+        tbb::parallel_for(std::size_t{0}, needle.size(),
+                          [&](std::size_t t) { needle[t] = is_needle(mesh_.triangles[t]); });
+        for (std::size_t t = 0; t < needle.size(); ++t)
+            if (needle[t])
+                add_movable({&mesh_.triangles[t], 1}, hit);
+        for (const auto& pair : find_crossings(mesh_.positions, mesh_.triangles, picked))
+            if (!untangle(pair, turned))
+                add_movable(std::array{mesh_.triangles[pair[0]], mesh_.triangles[pair[1]]}, hit);
+        if (hit.empty() && turned.empty())
+            hit = in_one_place();
         std::sort(hit.begin(), hit.end());
         hit.erase(std::unique(hit.begin(), hit.end()), hit.end());
         return hit;
+    }
+    /// Those outside of their cells, or else all.
+    void add_movable(std::span<const Triangle> triangles, std::vector<std::uint32_t>& hit) const {
+        const auto add = [&](bool all) {
+            const std::size_t before = hit.size();
+            for (const Triangle& t : triangles)
+                for (const std::uint32_t v : t)
+                    if (all || (stage_[v] == 0 && !cell_box(v).contains(mesh_.positions[v])))
+                        hit.push_back(v);
+            return hit.size() > before;
+        };
+        if (!add(false))
+            add(true);
     }
     bool is_needle(const Triangle& t) const {
         constexpr double kThin = 1e-5; // height over length
@@ -270,6 +334,8 @@ private:
     std::vector<Crossing> crossings_;           ///< one for each polygon
     std::vector<std::uint32_t> first_, around_; ///< polygons of vertex v
     std::vector<std::uint32_t> first_triangle_; ///< of each polygon
+    std::vector<char> split_first_;             ///< which diagonal polygons are split along
+    std::vector<char> turned_;                  ///< those for which another one was taken
     std::vector<std::uint8_t> stage_;           ///< of retreat
     LabelledMesh mesh_;
 };
@@ -322,7 +388,7 @@ LabelledMesh extract(const openvdb::FloatGrid& solid, const Field* field,
         refuse_empty(solid);
     const auto probe = field
                            ? field->probe(region_of(blocks, lattice), kReach_vox * lattice.voxel_m)
-                           : level_set_probe(solid.deepCopy());
+                           : level_set_probe({openvdb::FloatGrid::ConstPtr(), &solid});
     const SurfacePoints points(solid, *probe, lattice);
     SmallCells small;
     for (int attempt = 0; attempt < kMostAttempts; ++attempt) {

@@ -8,7 +8,7 @@ namespace taihu {
 namespace {
 
 // In voxels.
-constexpr double kOnEdge = 1e-4, kOnSurface = 1e-3, kFarthest = 4;
+constexpr double kOnEdge = 1e-4, kOnSurface = 1e-3, kNearEnough = 0.05, kFarthest = 4;
 // Normals of one primitive that differ by more than 40 degrees in a cell: it has edges of its own.
 constexpr double kSmoothCosine = 0.77;
 
@@ -52,7 +52,8 @@ std::optional<Vec3> nearest_to_planes(std::span<const Crossing> crossings, const
 bool is_smooth(std::span<const Crossing> crossings) {
     for (std::size_t i = 0; i < crossings.size(); ++i)
         for (std::size_t k = i + 1; k < crossings.size(); ++k)
-            if (dot(crossings[i].normal, crossings[k].normal) < kSmoothCosine)
+            if (crossings[i].primitive == crossings[k].primitive &&
+                dot(crossings[i].normal, crossings[k].normal) < kSmoothCosine)
                 return false;
     return true;
 }
@@ -101,6 +102,12 @@ Crossing SurfacePoints::on_edge(const openvdb::Coord& at, int axis) const {
             f1 = f.value_m;
         }
     }
+    // Fields that are sampled by way of a mesh are off by a little: the nearer end will do.
+    for (const Vec3& p : {p0 + way * t0, p0 + way * t1}) {
+        const FieldProbe::Nearest f = field_.at(p);
+        if (std::fabs(f.value_m) <= kNearEnough * lattice_.voxel_m)
+            return {p, normalized(field_.of(f.primitive, p).gradient), f.primitive, true};
+    }
     return c;
 }
 
@@ -126,41 +133,85 @@ LabelledPoint SurfacePoints::place(std::span<const Crossing> crossings, const Bo
     }
     if (!known)
         return {mean, {}};
-    const Box reach = cell.dilated(slack_m);
-    const double farthest = kFarthest * lattice_.voxel_m;
     if (set.size() == 1 && !is_smooth(crossings)) {
         if (const auto p = nearest_to_planes(crossings, mean)) {
-            const Vec3 in = held(*p, cell.dilated(0.25 * slack_m));
+            const Vec3 in = held(*p, cell);
             if (std::fabs(field_.at(in).value_m) <= 0.1 * lattice_.voxel_m)
                 return {in, set};
         }
     }
-    const auto settle = [&](PrimitiveSet s) -> std::optional<LabelledPoint> {
-        for (int i = 0; i < 3; ++i) {
-            const auto p = onto(field_, s, mean, farthest);
-            if (!p || !reach.contains(*p))
-                return std::nullopt;
-            const FieldProbe::Nearest there = field_.at(*p);
-            if (std::fabs(there.value_m) <= kOnSurface * lattice_.voxel_m)
-                return LabelledPoint{*p, s};
-            const std::size_t before = s.size(); // another primitive cuts it off there
-            if (!s.add(there.primitive) || s.size() == before)
-                return std::nullopt;
-        }
-        return std::nullopt;
-    };
-    if (const auto found = settle(set); found && all_in)
+    if (all_in)
+        if (const auto found = settle(set, mean, cell, slack_m))
+            return *found;
+    if (const auto found = on_rim(set, mean, cell))
         return *found;
+    return on_face(mean, cell);
+}
+
+std::optional<LabelledPoint> SurfacePoints::on_rim(const PrimitiveSet& set, const Vec3& from,
+                                                   const Box& cell) const {
+    std::optional<LabelledPoint> best;
     for (std::size_t i = 0; i < set.size() && set.size() == 3; ++i) {
         PrimitiveSet two;
         for (std::size_t k = 0; k < 3; ++k)
             if (k != i)
                 two.add(set[k]);
-        const auto p = onto(field_, two, mean, farthest);
-        if (p && reach.contains(*p) && is_on(*p))
-            return {*p, two};
+        const auto p = meeting(two, from, cell, 0);
+        if (p && is_on(*p) && (!best || length(*p - from) < length(best->point - from)))
+            best = LabelledPoint{*p, two};
     }
-    return on_face(mean, cell);
+    return best;
+}
+
+LabelledPoint SurfacePoints::back_in(const LabelledPoint& p, const Box& cell) const {
+    const Vec3 in = held(p.point, cell);
+    if (const auto rim = on_rim(p.labels, in, cell))
+        return *rim;
+    return on_face(in, cell);
+}
+
+std::optional<LabelledPoint> SurfacePoints::settle(PrimitiveSet set, const Vec3& from,
+                                                   const Box& cell, double slack_m) const {
+    for (int i = 0; i < 3; ++i) {
+        const auto p = meeting(set, from, cell, slack_m);
+        if (!p)
+            return std::nullopt;
+        const FieldProbe::Nearest there = field_.at(*p);
+        if (std::fabs(there.value_m) <= kOnSurface * lattice_.voxel_m)
+            return LabelledPoint{*p, set};
+        const std::size_t before = set.size(); // another primitive cuts it off there
+        if (!set.add(there.primitive) || set.size() == before)
+            return std::nullopt;
+    }
+    return std::nullopt;
+}
+
+std::optional<Vec3> SurfacePoints::meeting(const PrimitiveSet& set, const Vec3& from,
+                                           const Box& cell, double slack_m) const {
+    const double farthest = kFarthest * lattice_.voxel_m;
+    const auto nearest = onto(field_, set, from, farthest);
+    auto p = nearest;
+    // A rim that passes crossings of both its faces passes the cell: follow it there.
+    for (int i = 0; i < 3 && p && set.size() == 2 && !cell.contains(*p); ++i) {
+        const Vec3 way =
+            normalized(cross(field_.of(set[0], *p).gradient, field_.of(set[1], *p).gradient));
+        double first = -farthest, last = farthest;
+        for (int axis = 0; axis < 3; ++axis) {
+            if (std::fabs(way[axis]) < 1e-9)
+                continue;
+            const double a = (cell.lo[axis] - (*p)[axis]) / way[axis],
+                         b = (cell.hi[axis] - (*p)[axis]) / way[axis];
+            first = std::max(first, std::min(a, b));
+            last = std::min(last, std::max(a, b));
+        }
+        const auto next = onto(field_, set, *p + way * (0.5 * (first + last)), farthest);
+        if (!next)
+            break;
+        p = next;
+    }
+    if (p && cell.contains(*p))
+        return p;
+    return nearest && cell.dilated(slack_m).contains(*nearest) ? nearest : std::nullopt;
 }
 
 bool SurfacePoints::joins(const std::array<openvdb::Coord, 4>& corners) const {

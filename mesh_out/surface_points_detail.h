@@ -1,4 +1,6 @@
 #pragma once
+#include <array>
+#include <optional>
 #include <span>
 
 #include <openvdb/openvdb.h>
@@ -37,16 +39,28 @@ public:
     /// Where the surface is in a cell, of which it passes edges at `crossings`: in a corner, on a
     /// rim or a face, up to `slack_m` outside of the cell, or else on the face in it.
     LabelledPoint place(std::span<const Crossing> crossings, const Box& cell, double slack_m) const;
-    /// The same without rims: the nearest point of the face at `p`, held to the cell.
+    /// The same without rims: a point of the face at `p`, held to the cell.
     LabelledPoint on_face(const Vec3& p, const Box& cell) const;
+    /// What is left in a cell of a point outside of it: of a corner one of its rims, of others the
+    /// face.
+    LabelledPoint back_in(const LabelledPoint& p, const Box& cell) const;
     /// The face at a point.
     PrimitiveSet label(const Vec3& p) const { return PrimitiveSet(field_.at(p).primitive); }
     bool is_on(const Vec3& p) const;
-    /// Whether faces of a negative and a positive pair of corners join those inside: by the saddle
-    /// between the voxels a, b, c, d round a face, of which a and c are inside or b and d are.
+    /// Whether a face whose corners alternate joins those inside, by the saddle of its values.
+    /// \param corners  the voxels in their order around it.
     bool joins(const std::array<openvdb::Coord, 4>& corners) const;
 
 private:
+    std::optional<LabelledPoint> settle(PrimitiveSet set, const Vec3& from, const Box& cell,
+                                        double slack_m) const;
+    /// The nearest rim in the cell, of three primitives.
+    std::optional<LabelledPoint> on_rim(const PrimitiveSet& set, const Vec3& from,
+                                        const Box& cell) const;
+    /// Where primitives meet, in the cell if they do so there.
+    std::optional<Vec3> meeting(const PrimitiveSet& set, const Vec3& from, const Box& cell,
+                                double slack_m) const;
+
     // Without a place in the tree's list of accessors.
     openvdb::tree::ValueAccessor<const openvdb::FloatTree, false> accessor_;
     const FieldProbe& field_;

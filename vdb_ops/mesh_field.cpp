@@ -231,8 +231,6 @@ private:
 
 } // namespace
 
-MeshField::MeshField(ClosedMesh mesh) : mesh_(std::move(mesh)) {}
-
 std::unique_ptr<LatticeField> MeshField::on(const Lattice& lattice,
                                             const openvdb::CoordBBox&) const {
     return std::make_unique<LatticeMesh>(mesh_, lattice);

@@ -18,12 +18,18 @@ public:
     /// Cost: the columns and a coarse list of faces; serial parts O(faces).
     std::unique_ptr<LatticeField> on(const Lattice& lattice,
                                      const openvdb::CoordBBox& region) const override;
-    Primitive n_primitives() const override { return 1; }
+    /// One for each set of faces that meet at less than 30 degrees; one for all where nearly every
+    /// face would be one.
+    Primitive n_primitives() const override;
     std::unique_ptr<FieldProbe> probe(const Box& region_m, double reach_m) const override;
     const ClosedMesh& mesh() const { return mesh_; }
 
 private:
+    struct Patches;
+    const Patches& patches() const;
+
     ClosedMesh mesh_;
+    std::shared_ptr<Patches> patches_; ///< made when first asked for
 };
 
 } // namespace taihu

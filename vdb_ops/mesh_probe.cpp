@@ -2,12 +2,22 @@
 #include <array>
 #include <cmath>
 #include <cstdint>
+#include <mutex>
+#include <numeric>
 
 #include "vdb_ops/columns_detail.h"
 #include "vdb_ops/mesh_field.h"
 #include "vdb_ops/probe_detail.h"
 
 namespace taihu {
+
+/// Which smooth part each face belongs to, numbered in the order of their first faces.
+struct MeshField::Patches {
+    std::once_flag once;
+    std::vector<std::uint32_t> of_face;
+    std::uint32_t n = 1;
+};
+
 namespace {
 
 using Corners = std::array<Vec3, 3>;
@@ -156,12 +166,61 @@ Foot foot_on(const Corners& t, const Vec3& p) {
     return {t[0] + ab * (vb / all) + ac * (vc / all), true};
 }
 
+Vec3 face_normal(const ClosedMesh& mesh, std::size_t face) {
+    const Triangle& t = mesh.triangles[face];
+    return normalized(cross(mesh.positions[t[1]] - mesh.positions[t[0]],
+                            mesh.positions[t[2]] - mesh.positions[t[0]]));
+}
+
+/// Joins faces over edges that are not sharp.
+std::vector<std::uint32_t> smooth_parts(const ClosedMesh& mesh, std::uint32_t& n_parts) {
+    constexpr double kSmoothCosine = 0.866;
+    struct Side {
+        std::uint64_t edge;
+        std::uint32_t face;
+    };
+    const std::size_t n = mesh.triangles.size();
+    std::vector<Side> sides;
+    sides.reserve(3 * n);
+    for (std::uint32_t f = 0; f < n; ++f)
+        for (std::size_t k = 0; k < 3; ++k) {
+            const auto [lo, hi] = std::minmax(mesh.triangles[f][k], mesh.triangles[f][(k + 1) % 3]);
+            sides.push_back({std::uint64_t{lo} << 32 | hi, f});
+        }
+    std::sort(sides.begin(), sides.end(), [](const Side& a, const Side& b) {
+        return a.edge != b.edge ? a.edge < b.edge : a.face < b.face;
+    });
+    std::vector<std::uint32_t> parent(n);
+    std::iota(parent.begin(), parent.end(), 0u);
+    const auto root = [&](std::uint32_t f) {
+        while (parent[f] != f)
+            f = parent[f] = parent[parent[f]];
+        return f;
+    };
+    for (std::size_t i = 0, end = 0; i < sides.size(); i = end) {
+        for (end = i; end < sides.size() && sides[end].edge == sides[i].edge;)
+            ++end;
+        const std::uint32_t f = sides[i].face, g = sides[end - 1].face;
+        if (end - i == 2 && mesh.shell_of[f] == mesh.shell_of[g] &&
+            dot(face_normal(mesh, f), face_normal(mesh, g)) > kSmoothCosine) {
+            const std::uint32_t a = root(f), b = root(g);
+            parent[std::max(a, b)] = std::min(a, b);
+        }
+    }
+    std::vector<std::uint32_t> part(n);
+    n_parts = 0;
+    for (std::uint32_t f = 0; f < n; ++f)
+        part[f] = root(f) == f ? n_parts++ : part[root(f)];
+    return part;
+}
+
 /// Exact distances of a mesh at single points. Which side a point is on is counted along the way to
 /// the middle of its cell, whose winding number is known, where the nearest face does not tell.
 class MeshProbe final : public FieldProbe {
 public:
-    MeshProbe(const ClosedMesh& mesh, const Box& region, double reach_m)
-        : mesh_(mesh), reach_m_(reach_m), cube_(region, 4 * reach_m, kMostDepth),
+    MeshProbe(const ClosedMesh& mesh, const std::vector<std::uint32_t>& part, const Box& region,
+              double reach_m)
+        : mesh_(mesh), part_(part), reach_m_(reach_m), cube_(region, 4 * reach_m, kMostDepth),
           columns_(mesh, in_cells(), cells()) {
         std::vector<std::vector<std::uint32_t>> faces(mesh.shells.size());
         // Ways to middles of cells reach beyond the region by a cell.
@@ -183,11 +242,63 @@ public:
             trees_.emplace_back(mesh, std::move(f));
     }
 
-    Nearest at(const Vec3& p) const override { return {value(p).value_m, 0}; }
-    Value of(Primitive, const Vec3& p) const override { return value(p); }
+    Nearest at(const Vec3& p) const override {
+        Nearest at{reach_m_, 0};
+        for (std::uint32_t s = 0; s < trees_.size(); ++s) {
+            const Shell::Role role = mesh_.shells[s].role;
+            if (role == Shell::Role::sheet)
+                continue;
+            Nearest shell = shell_at(s, p);
+            if (role == Shell::Role::cavity)
+                shell.value_m = -shell.value_m;
+            if (role == Shell::Role::cavity ? shell.value_m > at.value_m
+                                            : shell.value_m < at.value_m)
+                at = shell;
+        }
+        return at;
+    }
+    /// The distance from the plane of the part's nearest face.
+    Value of(Primitive part, const Vec3& p) const override {
+        double least2 = std::numeric_limits<double>::infinity();
+        std::uint32_t nearest = 0;
+        Foot best{p};
+        for (const FaceTree& tree : trees_) {
+            if (tree.empty())
+                continue;
+            tree.nearest(
+                p, [&] { return least2; },
+                [&](std::uint32_t f) {
+                    if (part_[f] != part)
+                        return;
+                    const Foot foot = foot_on(corners(f), p);
+                    const double d2 = length_squared(p - foot.point);
+                    if (d2 > least2 || (d2 == least2 && !foot.inside))
+                        return;
+                    least2 = d2;
+                    nearest = f;
+                    best = foot;
+                });
+        }
+        if (least2 == std::numeric_limits<double>::infinity())
+            return {reach_m_, {}}; // not in the region
+        const Shell& shell = mesh_.shells[mesh_.shell_of[nearest]];
+        const bool turned = (shell.volume_m3 < 0) != (shell.role == Shell::Role::cavity);
+        const Vec3 normal = face_normal(mesh_, nearest) * (turned ? -1.0 : 1.0);
+        return {dot(normal, p - best.point), normal};
+    }
     void near(const Vec3& p, double reach_m, std::vector<Primitive>& out) const override {
-        if (std::fabs(value(p).value_m) <= reach_m)
-            out.push_back(0);
+        const auto begin = static_cast<std::ptrdiff_t>(out.size());
+        const double reach2 = reach_m * reach_m;
+        for (const FaceTree& tree : trees_)
+            if (!tree.empty())
+                tree.nearest(
+                    p, [&] { return reach2; },
+                    [&](std::uint32_t f) {
+                        if (length_squared(p - foot_on(corners(f), p).point) <= reach2)
+                            out.push_back(part_[f]);
+                    });
+        std::sort(out.begin() + begin, out.end());
+        out.erase(std::unique(out.begin() + begin, out.end()), out.end());
     }
     std::optional<Sphere> ball(Primitive) const override { return std::nullopt; }
 
@@ -210,30 +321,13 @@ private:
         return {mesh_.positions[t[0]], mesh_.positions[t[1]], mesh_.positions[t[2]]};
     }
 
-    Value value(const Vec3& p) const {
-        Value v{reach_m_, {}};
-        for (std::uint32_t s = 0; s < trees_.size(); ++s) {
-            const Shell::Role role = mesh_.shells[s].role;
-            if (role == Shell::Role::sheet)
-                continue;
-            Value shell = shell_value(s, p);
-            if (role == Shell::Role::cavity) {
-                shell = {-shell.value_m, -shell.gradient};
-                if (shell.value_m > v.value_m)
-                    v = shell;
-            } else if (shell.value_m < v.value_m) {
-                v = shell;
-            }
-        }
-        return v;
-    }
-
-    Value shell_value(std::uint32_t s, const Vec3& p) const {
+    Nearest shell_at(std::uint32_t s, const Vec3& p) const {
         const bool overlaps = columns_.overlaps_itself(s);
         const int winding = overlaps ? winding_at(s, p) : 0;
         double least2 = reach_m_ * reach_m_;
         Foot best{p};
         Vec3 normal;
+        std::uint32_t nearest = 0;
         const auto look = [&](std::uint32_t f) {
             const Corners t = corners(f);
             const Foot foot = foot_on(t, p);
@@ -246,6 +340,7 @@ private:
             least2 = d2;
             best = foot;
             normal = n;
+            nearest = f;
         };
         if (!trees_[s].empty())
             trees_[s].nearest(
@@ -256,11 +351,7 @@ private:
                         : found && best.inside ? dot(normal, p - best.point) < 0
                                                : winding_at(s, p) != 0;
         const double d = found ? std::sqrt(least2) : reach_m_;
-        const Vec3 away = p - best.point;
-        // On the surface the way to it has no direction.
-        const Vec3 gradient =
-            d > 1e-9 * reach_m_ && found ? away / (in ? -d : d) : normalized(normal);
-        return {in ? -d : d, gradient};
+        return {in ? -d : d, found ? part_[nearest] : 0};
     }
 
     int winding_at(std::uint32_t s, const Vec3& p) const {
@@ -304,6 +395,7 @@ private:
     }
 
     const ClosedMesh& mesh_;
+    const std::vector<std::uint32_t>& part_;
     double reach_m_;
     CellCube cube_;
     Columns columns_;
@@ -312,8 +404,27 @@ private:
 
 } // namespace
 
+MeshField::MeshField(ClosedMesh mesh)
+    : mesh_(std::move(mesh)), patches_(std::make_shared<Patches>()) {}
+
+const MeshField::Patches& MeshField::patches() const {
+    std::call_once(patches_->once, [this] {
+        constexpr std::size_t kMany = 64, kFacesEach = 16;
+        patches_->of_face = smooth_parts(mesh_, patches_->n);
+        if (patches_->n > std::max(kMany, mesh_.triangles.size() / kFacesEach)) {
+            std::fill(patches_->of_face.begin(), patches_->of_face.end(), 0u);
+            patches_->n = 1;
+        }
+    });
+    return *patches_;
+}
+
+Primitive MeshField::n_primitives() const {
+    return patches().n;
+}
+
 std::unique_ptr<FieldProbe> MeshField::probe(const Box& region_m, double reach_m) const {
-    return std::make_unique<MeshProbe>(mesh_, region_m, reach_m);
+    return std::make_unique<MeshProbe>(mesh_, patches().of_face, region_m, reach_m);
 }
 
 } // namespace taihu

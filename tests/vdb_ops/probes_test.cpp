@@ -202,14 +202,24 @@ TEST(Probes, OfFunctionsAndSuperquadrics) {
 }
 
 TEST(Probes, OfMeshes) {
-    expect_probe(MeshField(close_mesh(placed(cube(), tilted()), "cube")), kExact, 3, false);
+    expect_probe(MeshField(close_mesh(placed(cube(), tilted()), "cube")), kExact);
     // Cubes that overlap, and a cavity.
     TriMesh many = cube({0.31, 0.27, 0.4});
     append(many, cube());
     TriMesh cavity = cube({-0.2, -0.2, -0.2}, 0.3);
     flip(cavity);
     append(many, cavity);
-    expect_probe(MeshField(close_mesh(many, "cubes")), kExact, 3, false);
+    expect_probe(MeshField(close_mesh(many, "cubes")), kExact);
+}
+
+TEST(Probes, TellSmoothPartsOfMeshesApart) {
+    EXPECT_EQ(MeshField(close_mesh(cube(), "cube")).n_primitives(), 6u);
+    const TriMesh ball =
+        superquadric_mesh({.semi_axes_m = {0.5, 0.5, 0.5}, .vertical = 1, .around = 1}, 16);
+    EXPECT_EQ(MeshField(close_mesh(ball, "ball")).n_primitives(), 1u);
+    TriMesh both = cube();
+    append(both, cube({3, 0, 0}));
+    EXPECT_EQ(MeshField(close_mesh(both, "cubes")).n_primitives(), 12u);
 }
 
 TEST(Probes, OfLevelSets) {
