@@ -218,12 +218,14 @@ public:
     struct Face {
         Box box;
         Triangle vertices{};
+        std::uint32_t index = 0; ///< in the order that they were given in
     };
 
     BoxTree(std::span<const Vec3> positions, std::span<const Triangle> faces)
         : faces_(faces.size()) {
         tbb::parallel_for(std::size_t{0}, faces.size(), [&](std::size_t i) {
             faces_[i].vertices = faces[i];
+            faces_[i].index = static_cast<std::uint32_t>(i);
             for (const std::uint32_t v : faces[i])
                 faces_[i].box.include(positions[v]);
         });
@@ -377,6 +379,40 @@ std::size_t count_crossings(std::span<const Vec3> positions, std::span<const Tri
             return n;
         },
         [](std::size_t a, std::size_t b) { return a + b; });
+}
+
+std::vector<std::pair<std::uint32_t, std::uint32_t>>
+crossing_pairs(std::span<const Vec3> positions, std::span<const Triangle> faces,
+               std::span<const std::uint8_t> picked) {
+    using Pairs = std::vector<std::pair<std::uint32_t, std::uint32_t>>;
+    if (faces.empty())
+        return {};
+    const BoxTree tree(positions, faces);
+    const std::span<const BoxTree::Face> sorted = tree.faces();
+    const auto is_picked = [&](std::size_t i) {
+        return picked.empty() || picked[sorted[i].index] != 0;
+    };
+    Pairs pairs = tbb::parallel_reduce(
+        tbb::blocked_range<std::size_t>(0, sorted.size(), 256), Pairs{},
+        [&](const tbb::blocked_range<std::size_t>& range, Pairs found) {
+            for (std::size_t i = range.begin(); i < range.end(); ++i) {
+                if (!is_picked(i))
+                    continue;
+                tree.visit_from(picked.empty() ? i + 1 : 0, sorted[i].box, [&](std::size_t k) {
+                    if (k != i && (k > i || !is_picked(k)) &&
+                        BoxTree::overlap(sorted[i].box, sorted[k].box) &&
+                        faces_cross(positions, sorted[i].vertices, sorted[k].vertices))
+                        found.push_back(std::minmax(sorted[i].index, sorted[k].index));
+                });
+            }
+            return found;
+        },
+        [](Pairs a, const Pairs& b) {
+            a.insert(a.end(), b.begin(), b.end());
+            return a;
+        });
+    std::sort(pairs.begin(), pairs.end());
+    return pairs;
 }
 
 } // namespace taihu

@@ -1,6 +1,9 @@
 #pragma once
 #include <cstddef>
+#include <cstdint>
 #include <span>
+#include <utility>
+#include <vector>
 
 #include "stats/core/tri_mesh.h"
 
@@ -25,5 +28,11 @@ bool faces_cross(std::span<const Vec3> positions, Triangle f, Triangle g);
 /// Number of pairs of `faces` for which faces_cross() holds; the same on any number of threads.
 /// Time O(n log n + pairs whose boxes overlap), memory about 100 bytes per face.
 std::size_t count_crossings(std::span<const Vec3> positions, std::span<const Triangle> faces);
+
+/// The pairs themselves, lower index first, ascending. Time also O(log n) per picked face.
+/// \param picked  one per face, or empty for all: pairs with at least one picked face.
+std::vector<std::pair<std::uint32_t, std::uint32_t>>
+crossing_pairs(std::span<const Vec3> positions, std::span<const Triangle> faces,
+               std::span<const std::uint8_t> picked = {});
 
 } // namespace taihu
