@@ -67,6 +67,8 @@ double FaceErrors::bound(const Corners& face, const Labels& labels, const Rules&
             return kInfinity;
     }
     const double radius = radius_about(m, face), reach = radius + most + kTouch * spacing_;
+    int n_active = 0;
+    std::uint32_t active = kNone;
     std::array<int, 3> lo{}, hi{};
     for (int a = 0; a < 3; ++a) {
         lo[a] = coordinate(std::min({face[0][a], face[1][a], face[2][a]}), a);
@@ -96,8 +98,15 @@ double FaceErrors::bound(const Corners& face, const Labels& labels, const Rules&
                     bool is_labelled = false;
                     for (const std::uint32_t l : labels)
                         is_labelled = is_labelled || sets_[l].has(other);
-                    most = std::max(most, against(shape, range, other, is_labelled, face, labels, rules));
-                    if (most == kInfinity)
+                    const double past =
+                        against(shape, range, other, is_labelled, face, labels, rules);
+                    most = std::max(most, past);
+                    // A third primitive may cut off the rim of two.
+                    if (past > 0 && other != active) {
+                        ++n_active;
+                        active = other;
+                    }
+                    if (most == kInfinity || (rules.may_pierce && n_active > 1))
                         return kInfinity;
                 }
             }
@@ -105,14 +114,20 @@ double FaceErrors::bound(const Corners& face, const Labels& labels, const Rules&
 }
 
 double FaceErrors::clearance(const Vec3& p, std::uint32_t label) const {
-    const std::uint32_t list = cells_[cell_of({coordinate(p.x, 0), coordinate(p.y, 1),
-                                               coordinate(p.z, 2)})];
+    const std::array<int, 3> at = {coordinate(p.x, 0), coordinate(p.y, 1), coordinate(p.z, 2)};
+    const std::uint32_t list = cells_[cell_of(at)];
     double least = pad_; // the lists know no more
-    for (std::uint32_t i = list == kNone ? 0 : first_[list];
-         list != kNone && i < first_[list + 1]; ++i) {
+    if (list == kNone)
+        return least;
+    const double off_center = length(p - center_of(at));
+    for (std::uint32_t i = first_[list]; i < first_[list + 1]; ++i) {
         const Shape& s = shapes_[near_[i]];
-        if (!s.is_ball && !sets_[label].has(near_[i]))
-            least = std::min(least, std::abs(field_.of(s.primitive, p).value_m));
+        if (s.is_ball || sets_[label].has(near_[i]))
+            continue;
+        const double at_least = std::abs(static_cast<double>(center_values_[i])) - off_center;
+        least = std::min(least, at_least > 2 * spacing_
+                                    ? at_least
+                                    : std::abs(field_.of(s.primitive, p).value_m));
     }
     return least;
 }
@@ -125,7 +140,8 @@ std::uint32_t FaceErrors::own(const Corners& face, const Labels& labels, bool ex
         if ((labels[1] != labels[0] && !sets_[labels[1]].has(s)) ||
             (labels[2] != labels[0] && !sets_[labels[2]].has(s)))
             continue;
-        const Range r = range(s, face, exact_corners, give_up_m);
+        constexpr CornerValues kOnIt{};
+        const Range r = range(s, face, exact_corners ? &kOnIt : nullptr, give_up_m);
         if (r.most() < least) {
             least = r.most();
             best = s;
@@ -144,11 +160,11 @@ FieldProbe::Value FaceErrors::of(std::uint32_t shape, const Vec3& p) const {
     return {s.sign * (l - s.radius), d * (s.sign / std::max(l, 1e-300))};
 }
 
-FaceErrors::Range FaceErrors::range(std::uint32_t shape, const Corners& f, bool zero_at_corners,
-                                    double give_up_m) const {
+FaceErrors::Range FaceErrors::range(std::uint32_t shape, const Corners& f,
+                                    const CornerValues* known, double give_up_m) const {
     const Shape& s = shapes_[shape];
     if (!s.is_ball)
-        return sampled_range(s, f, zero_at_corners, give_up_m);
+        return sampled_range(s, f, known, give_up_m);
     const double nearest =
         length(closest_point_on_triangle(s.center, f[0], f[1], f[2]) - s.center) - s.radius;
     const double farthest = radius_about(s.center, f) - s.radius;
@@ -156,7 +172,7 @@ FaceErrors::Range FaceErrors::range(std::uint32_t shape, const Corners& f, bool 
 }
 
 FaceErrors::Range FaceErrors::sampled_range(const Shape& shape, const Corners& f,
-                                            bool zero_at_corners, double give_up_m) const {
+                                            const CornerValues* known, double give_up_m) const {
     const std::size_t n = std::clamp(
         static_cast<std::size_t>(std::ceil(longest_edge(f) / (1.6 * spacing_))), std::size_t{2},
         kMostSteps);
@@ -169,7 +185,9 @@ FaceErrors::Range FaceErrors::sampled_range(const Shape& shape, const Corners& f
         for (std::size_t v = 0; u + v <= n; ++v) {
             const bool corner = u == n || v == n || u + v == 0;
             double d = 0;
-            if (!corner || !zero_at_corners) {
+            if (corner && known) {
+                d = (*known)[u == n ? 1 : v == n ? 2 : 0];
+            } else {
                 const double x = static_cast<double>(u) / static_cast<double>(n),
                              y = static_cast<double>(v) / static_cast<double>(n);
                 const auto sample =
@@ -204,37 +222,37 @@ FaceErrors::Range FaceErrors::sampled_range(const Shape& shape, const Corners& f
 double FaceErrors::against(std::uint32_t own, const Range& own_range, std::uint32_t other,
                            bool is_labelled, const Corners& face, const Labels& labels,
                            const Rules& rules) const {
-    double lo = kInfinity, hi = -kInfinity;
-    for (std::size_t k = 0; k < 3; ++k) {
-        const bool on = rules.exact_corners && sets_[labels[k]].has(other);
-        const double d = on ? 0 : of(other, face[k]).value_m;
-        lo = std::min(lo, d);
-        hi = std::max(hi, d);
-    }
-    const Meeting pair{own, other, -lo >= hi ? 1. : -1., rules};
+    CornerValues corners{};
+    for (std::size_t k = 0; k < 3; ++k)
+        if (!rules.exact_corners || !sets_[labels[k]].has(other))
+            corners[k] = of(other, face[k]).value_m;
+    const double lo = std::min({corners[0], corners[1], corners[2]}),
+                 hi = std::max({corners[0], corners[1], corners[2]});
     const double tolerance = kTouch * spacing_;
-    if (!is_labelled && !rules.may_pierce) {
-        if (lo < -tolerance && hi > tolerance) {
-            // Through a part of it that bounds nothing, unless the field says otherwise.
-            const FieldProbe::Nearest n = field_.at(middle(face));
-            if (std::abs(n.value_m) > tolerance && n.primitive != shapes_[own].primitive)
-                return kInfinity;
-            return 0;
-        }
-        const Range r = range(other, face, false);
-        if ((pair.turn > 0 ? r.hi : -r.lo) > tolerance)
-            return kInfinity;
+    const bool pierces_nothing = !is_labelled && !rules.may_pierce;
+    if (pierces_nothing && lo < -tolerance && hi > tolerance) {
+        // Through a part of it that bounds nothing, unless the field says otherwise.
+        const FieldProbe::Nearest n = field_.at(middle(face));
+        return std::abs(n.value_m) > tolerance && n.primitive != shapes_[own].primitive ? kInfinity
+                                                                                        : 0;
     }
-    // Nothing of the face lies past the rim when its own primitive is 0 all over it.
-    if (own_range.most() == 0 && is_labelled)
-        return 0;
-    return meeting(pair, face, 0);
+    const Range range_there = range(other, face, &corners);
+    Meeting pair{own, other, -lo >= hi ? 1. : -1., rules};
+    if (pierces_nothing && (pair.turn > 0 ? range_there.hi : -range_there.lo) > tolerance)
+        return kInfinity;
+    double most = meeting(pair, face, own_range, range_there, 0);
+    // Corners on both sides of it do not say on which the solid is.
+    if (rules.may_pierce && lo < 0 && hi > 0) {
+        pair.turn = -pair.turn;
+        most = std::max(most, meeting(pair, face, own_range, range_there, 0));
+    }
+    return most;
 }
 
 /// Of the part of a face that lies past the rim of two primitives, an upper bound of the distance
 /// to that rim; 0 when there is no such part.
-double FaceErrors::meeting(const Meeting& pair, const Corners& face, int depth) const {
-    const Range a = range(pair.own, face, false), b = range(pair.other, face, false);
+double FaceErrors::meeting(const Meeting& pair, const Corners& face, const Range& a,
+                           const Range& b, int depth) const {
     double own = pair.turn > 0 ? a.hi : -a.lo;
     const double other = pair.turn > 0 ? b.hi : -b.lo;
     if (pair.rules.centred)
@@ -249,7 +267,8 @@ double FaceErrors::meeting(const Meeting& pair, const Corners& face, int depth) 
         return kInfinity;
     double most = 0;
     for (const Corners& part : quarters(face)) {
-        most = std::max(most, meeting(pair, part, depth + 1));
+        most = std::max(most, meeting(pair, part, range(pair.own, part), range(pair.other, part),
+                                      depth + 1));
         if (most == kInfinity)
             return most;
     }

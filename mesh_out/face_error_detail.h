@@ -89,13 +89,17 @@ private:
     };
 
     void find_shapes(const LabelledMesh& mesh);
+    void find_center_values();
+    std::array<int, 3> coordinates(std::size_t cell) const;
     void find_near(const LabelledMesh& mesh, std::vector<std::vector<Primitive>>& near);
-    Range range(std::uint32_t shape, const Corners& face, bool zero_at_corners,
+    using CornerValues = std::array<double, 3>;
+    Range range(std::uint32_t shape, const Corners& face, const CornerValues* known = nullptr,
                 double give_up_m = kFar) const;
-    Range sampled_range(const Shape& shape, const Corners& face, bool zero_at_corners,
+    Range sampled_range(const Shape& shape, const Corners& face, const CornerValues* known,
                         double give_up_m) const;
     double past_rim(const Meeting& meeting, const Corners& face, double own, double other) const;
-    double meeting(const Meeting& meeting, const Corners& face, int depth) const;
+    double meeting(const Meeting& meeting, const Corners& face, const Range& own,
+                   const Range& other, int depth) const;
     double against(std::uint32_t own, const Range& own_range, std::uint32_t other, bool is_labelled,
                    const Corners& face, const Labels& labels, const Rules& rules) const;
     std::size_t cell_of(const std::array<int, 3>& c) const {
@@ -103,6 +107,9 @@ private:
                static_cast<std::size_t>(c[2]);
     }
     int coordinate(double x, int axis) const;
+    Vec3 center_of(const std::array<int, 3>& c) const {
+        return origin_ + Vec3{c[0] + .5, c[1] + .5, c[2] + .5} * cell_;
+    }
 
     const FieldProbe& field_;
     double spacing_, pad_, cell_ = 0;
@@ -110,6 +117,7 @@ private:
     std::array<std::size_t, 3> n_{};
     std::vector<std::uint32_t> cells_;       ///< number of the list of a cell, kNone far away
     std::vector<std::uint32_t> first_, near_; ///< shapes near each listed cell
+    std::vector<float> center_values_; ///< of these at the cell's centre, of balls 0
     std::vector<Shape> shapes_;
     std::vector<PrimitiveSet> sets_; ///< of shapes, by label number
     std::vector<std::uint32_t> labels_;

@@ -42,6 +42,7 @@ FaceErrors::FaceErrors(const LabelledMesh& mesh, const FieldProbe& field, double
         first_.push_back(static_cast<std::uint32_t>(near_.size()));
     }
     find_shapes(mesh);
+    find_center_values();
 }
 
 int FaceErrors::coordinate(double x, int axis) const {
@@ -72,13 +73,27 @@ void FaceErrors::find_near(const LabelledMesh& mesh, std::vector<std::vector<Pri
     const double half_diagonal = std::sqrt(3.) / 2 * cell_;
     tbb::parallel_for(tbb::blocked_range<std::size_t>(0, listed.size(), 64), [&](const auto& r) {
         for (std::size_t i = r.begin(); i < r.end(); ++i) {
-            const std::size_t c = listed[i];
-            const Vec3 index{double(c / n_[2] / n_[1]), double(c / n_[2] % n_[1]),
-                             double(c % n_[2])};
-            field_.near(origin_ + (index + Vec3{.5, .5, .5}) * cell_, half_diagonal + pad_,
-                        near[i]);
+            field_.near(center_of(coordinates(listed[i])), half_diagonal + pad_, near[i]);
         }
     });
+}
+
+std::array<int, 3> FaceErrors::coordinates(std::size_t cell) const {
+    return {static_cast<int>(cell / n_[2] / n_[1]), static_cast<int>(cell / n_[2] % n_[1]),
+            static_cast<int>(cell % n_[2])};
+}
+
+void FaceErrors::find_center_values() {
+    center_values_.assign(near_.size(), 0);
+    tbb::parallel_for(
+        tbb::blocked_range<std::size_t>(0, cells_.size(), 4096), [&](const auto& range) {
+            for (std::size_t c = range.begin(); c < range.end(); ++c)
+                for (std::uint32_t i = cells_[c] == kNone ? 0 : first_[cells_[c]];
+                     cells_[c] != kNone && i < first_[cells_[c] + 1]; ++i)
+                    if (const Shape& s = shapes_[near_[i]]; !s.is_ball)
+                        center_values_[i] = static_cast<float>(
+                            field_.of(s.primitive, center_of(coordinates(c))).value_m);
+        });
 }
 
 void FaceErrors::find_shapes(const LabelledMesh& mesh) {

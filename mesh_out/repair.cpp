@@ -1,7 +1,5 @@
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
-#include <cstdlib>
 #include <limits>
 #include <numeric>
 
@@ -24,7 +22,7 @@ double BoundedSurface::error_of(std::size_t face) const {
 
 namespace {
 
-constexpr int kRounds = 10;
+constexpr int kRounds = 8;
 constexpr double kShortest = 0.4;  ///< of a spacing: what is split no more
 constexpr double kLeastTurn = 0.2; ///< cosine of how far a split may turn a face
 
@@ -65,15 +63,24 @@ void Repair::measure() {
                       });
 }
 
-/// Marks faces that meet others, of pairs with one that changed since the last time.
+/// Marks faces that meet others, of pairs with one that changed since the last time. Faces without
+/// an area meet nothing that could be told.
 std::size_t Repair::find_crossing(std::vector<std::uint8_t>& meets) const {
-    std::vector<Triangle> faces(errors_.size());
-    for (std::size_t f = 0; f < faces.size(); ++f)
-        faces[f] = s_.table.triangle(f);
-    meets.assign(faces.size(), 0);
-    const auto pairs = crossing_pairs(s_.positions, faces, dirty_);
+    std::vector<Triangle> faces;
+    std::vector<std::uint32_t> numbers;
+    std::vector<std::uint8_t> picked;
+    for (std::uint32_t f = 0; f < errors_.size(); ++f) {
+        const Triangle t = s_.table.triangle(f);
+        if (dirty_[f] && is_flat(s_.positions[t[0]], s_.positions[t[1]], s_.positions[t[2]]))
+            continue;
+        faces.push_back(t);
+        numbers.push_back(f);
+        picked.push_back(dirty_[f]);
+    }
+    meets.assign(errors_.size(), 0);
+    const auto pairs = crossing_pairs(s_.positions, faces, picked);
     for (const auto& [f, g] : pairs)
-        meets[f] = meets[g] = 1;
+        meets[numbers[f]] = meets[numbers[g]] = 1;
     return pairs.size();
 }
 
@@ -198,11 +205,6 @@ BoundedMesh Repair::run(Progress* progress) {
         bad.assign(errors_.size(), 0);
         for (std::size_t f = 0; f < bad.size(); ++f)
             bad[f] = meets[f] || !(errors_[f] <= s_.bound_m);
-        if (std::getenv("DBG")) {
-            std::size_t nb = 0, ne = 0, nm = 0, nr=0, nx=0; 
-            for (std::size_t f = 0; f < bad.size(); ++f) if (bad[f]) { ++nb; nm += meets[f]; FaceErrors::Range r; bool own = s_.errors.own(s_.corners(f), s_.labels_of(f), false, r) != FaceErrors::kNone; ne += !own; nr += own && r.most() > s_.bound_m; nx += own && r.most() <= s_.bound_m;}
-            std::printf("round %d: %zu faces bad %zu, meets %zu, no own %zu, own over %zu, other %zu pairs %zu\n", round, bad.size(), nb, nm, ne, nr, nx, out.n_crossings);
-        }
         // What crosses stays in question until it does no more.
         dirty_ = meets;
         bool changed = false;
