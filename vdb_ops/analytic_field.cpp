@@ -4,6 +4,8 @@
 #include <array>
 #include <cmath>
 
+#include "vdb_ops/probe_detail.h"
+
 namespace taihu {
 namespace {
 
@@ -96,6 +98,33 @@ private:
     openvdb::CoordBBox box_;
 };
 
+/// The function itself, as one primitive.
+class AnalyticProbe final : public FieldProbe {
+public:
+    AnalyticProbe(const AnalyticField::Distances& distances, double reach_m)
+        : distances_(distances), step_m_(gradient_step(reach_m)) {}
+
+    Nearest at(const Vec3& p) const override { return {value(p), 0}; }
+    Value of(Primitive, const Vec3& p) const override {
+        return {value(p), gradient_of([this](const Vec3& q) { return value(q); }, p, step_m_)};
+    }
+    void near(const Vec3& p, double reach_m, std::vector<Primitive>& out) const override {
+        if (std::fabs(value(p)) <= reach_m)
+            out.push_back(0);
+    }
+    std::optional<Sphere> ball(Primitive) const override { return std::nullopt; }
+
+private:
+    double value(const Vec3& p) const {
+        double d = 0;
+        distances_({&p, 1}, &d);
+        return d;
+    }
+
+    const AnalyticField::Distances& distances_;
+    double step_m_;
+};
+
 } // namespace
 
 AnalyticField::AnalyticField(const Box& box, Distances distances)
@@ -104,6 +133,10 @@ AnalyticField::AnalyticField(const Box& box, Distances distances)
 std::unique_ptr<LatticeField> AnalyticField::on(const Lattice& lattice,
                                                 const openvdb::CoordBBox&) const {
     return std::make_unique<LatticeAnalytic>(box_, distances_, lattice);
+}
+
+std::unique_ptr<FieldProbe> AnalyticField::probe(const Box&, double reach_m) const {
+    return std::make_unique<AnalyticProbe>(distances_, reach_m);
 }
 
 double box_distance(const Vec3& p, const Vec3& half_size) {

@@ -29,6 +29,8 @@ public:
 
     std::unique_ptr<LatticeField> on(const Lattice& lattice,
                                      const openvdb::CoordBBox& region) const override;
+    Primitive n_primitives() const override { return 1; }
+    std::unique_ptr<FieldProbe> probe(const Box& region_m, double reach_m) const override;
 
 private:
     Box box_;

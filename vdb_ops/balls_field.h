@@ -16,6 +16,8 @@ public:
     explicit BallsField(std::span<const Sphere> balls);
     std::unique_ptr<LatticeField> on(const Lattice& lattice,
                                      const openvdb::CoordBBox& region) const override;
+    Primitive n_primitives() const override { return static_cast<Primitive>(balls_.size()); }
+    std::unique_ptr<FieldProbe> probe(const Box& region_m, double reach_m) const override;
 
 private:
     std::vector<Sphere> balls_;

@@ -268,6 +268,10 @@ std::unique_ptr<LatticeField> CombineField::on(const Lattice& lattice,
 
 double smooth_min(std::vector<double> values, double k) {
     std::sort(values.begin(), values.end());
+    return smooth_min_sorted(values, k);
+}
+
+double smooth_min_sorted(std::span<const double> values, double k) {
     return k > 0 ? blend_sorted(values.data(), values.data() + values.size(), k) : values.front();
 }
 

@@ -1,5 +1,6 @@
 #pragma once
 #include <memory>
+#include <span>
 #include <vector>
 
 #include "vdb_ops/field.h"
@@ -34,6 +35,8 @@ public:
     /// \throws Error bad_argument: a blend of more than 1000 voxels.
     std::unique_ptr<LatticeField> on(const Lattice& lattice,
                                      const openvdb::CoordBBox& region) const override;
+    Primitive n_primitives() const override;
+    std::unique_ptr<FieldProbe> probe(const Box& region_m, double reach_m) const override;
 
 private:
     Combine how_;
@@ -48,5 +51,7 @@ private:
 /// min(a, b) - max(k - |a - b|, 0)^2 / 4k; of three, it is not the two-fold blend of two, which
 /// depends on the order. Own derivation, by the projection onto the simplex.
 double smooth_min(std::vector<double> values, double k);
+/// Of ascending values, at least one.
+double smooth_min_sorted(std::span<const double> values, double k);
 
 } // namespace taihu

@@ -58,6 +58,11 @@ public:
     /// outlive what it returns.
     virtual std::unique_ptr<LatticeField> on(const Lattice& lattice,
                                              const openvdb::CoordBBox& region) const = 0;
+    /// How many primitives bound it.
+    virtual Primitive n_primitives() const = 0;
+    /// Prepare for single points of a finite box. The field must outlive what it returns.
+    /// \param reach_m  > 0: distances up to it are told, beyond it only the sign.
+    virtual std::unique_ptr<FieldProbe> probe(const Box& region_m, double reach_m) const = 0;
 };
 
 } // namespace taihu

@@ -56,11 +56,13 @@ public:
 
     virtual ~FieldProbe() = default;
     /// The field at a point of the box and the primitive that decides it, among equals the first.
+    /// Beyond the reach of the probe the value is at least that reach, of the right sign.
     virtual Nearest at(const Vec3& p) const = 0;
-    /// One primitive, anywhere.
+    /// One primitive, anywhere. Where at() decides for it on the surface both are 0; off the
+    /// surface they may differ, as past the edge of a box.
     virtual Value of(Primitive primitive, const Vec3& p) const = 0;
-    /// The primitives whose surface may come within `reach_m` of `p`, at most that of the probe,
-    /// where the solid's surface may be theirs; ascending.
+    /// Appends the primitives whose surface may come within `reach_m` of `p`, at most that of the
+    /// probe, where the solid's surface may be theirs; ascending, each once.
     virtual void near(const Vec3& p, double reach_m, std::vector<Primitive>& out) const = 0;
     /// The ball whose surface a primitive is, inside or out: distances to it have closed forms.
     virtual std::optional<Sphere> ball(Primitive primitive) const = 0;

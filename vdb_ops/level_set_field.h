@@ -13,6 +13,9 @@ public:
     /// \throws Error bad_argument: a lattice other than the grid's own.
     std::unique_ptr<LatticeField> on(const Lattice& lattice,
                                      const openvdb::CoordBBox& region) const override;
+    Primitive n_primitives() const override { return 1; }
+    /// Trilinear: right as far as the grid's half width less sqrt(3) voxels.
+    std::unique_ptr<FieldProbe> probe(const Box& region_m, double reach_m) const override;
 
 private:
     openvdb::FloatGrid::ConstPtr grid_;

@@ -17,6 +17,8 @@ public:
     /// Cost: the columns and a coarse list of faces; serial parts O(faces).
     std::unique_ptr<LatticeField> on(const Lattice& lattice,
                                      const openvdb::CoordBBox& region) const override;
+    Primitive n_primitives() const override { return 1; }
+    std::unique_ptr<FieldProbe> probe(const Box& region_m, double reach_m) const override;
     const ClosedMesh& mesh() const { return mesh_; }
 
 private:

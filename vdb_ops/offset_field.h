@@ -20,6 +20,8 @@ public:
     /// \throws Error bad_argument: more than 1000 voxels.
     std::unique_ptr<LatticeField> on(const Lattice& lattice,
                                      const openvdb::CoordBBox& region) const override;
+    Primitive n_primitives() const override;
+    std::unique_ptr<FieldProbe> probe(const Box& region_m, double reach_m) const override;
 
 private:
     std::shared_ptr<const Field> of_;
@@ -36,6 +38,8 @@ public:
     /// \throws Error bad_argument: more than 1000 voxels.
     std::unique_ptr<LatticeField> on(const Lattice& lattice,
                                      const openvdb::CoordBBox& region) const override;
+    Primitive n_primitives() const override;
+    std::unique_ptr<FieldProbe> probe(const Box& region_m, double reach_m) const override;
 
 private:
     std::shared_ptr<const Field> of_;
@@ -50,6 +54,8 @@ public:
     explicit ComplementField(std::shared_ptr<const Field> of);
     std::unique_ptr<LatticeField> on(const Lattice& lattice,
                                      const openvdb::CoordBBox& region) const override;
+    Primitive n_primitives() const override;
+    std::unique_ptr<FieldProbe> probe(const Box& region_m, double reach_m) const override;
 
 private:
     std::shared_ptr<const Field> of_;

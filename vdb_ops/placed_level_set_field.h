@@ -24,6 +24,8 @@ public:
     /// widen_band().
     std::unique_ptr<LatticeField> on(const Lattice& lattice,
                                      const openvdb::CoordBBox& region) const override;
+    Primitive n_primitives() const override { return 1; }
+    std::unique_ptr<FieldProbe> probe(const Box& region_m, double reach_m) const override;
 
 private:
     openvdb::FloatGrid::ConstPtr grid_;

@@ -255,11 +255,6 @@ private:
 
 } // namespace
 
-SolidsField::SolidsField(std::vector<AnalyticSolid> solids) : solids_(std::move(solids)) {
-    for (std::size_t i = 0; i < solids_.size(); ++i)
-        check_solid(solids_[i], "solids[" + std::to_string(i) + "]");
-}
-
 std::unique_ptr<LatticeField> SolidsField::on(const Lattice& lattice,
                                               const CoordBBox& region) const {
     return std::make_unique<LatticeSolids>(solids_, lattice, region);

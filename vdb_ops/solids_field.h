@@ -16,9 +16,12 @@ public:
     explicit SolidsField(std::vector<AnalyticSolid> solids);
     std::unique_ptr<LatticeField> on(const Lattice& lattice,
                                      const openvdb::CoordBBox& region) const override;
+    Primitive n_primitives() const override { return first_.back(); }
+    std::unique_ptr<FieldProbe> probe(const Box& region_m, double reach_m) const override;
 
 private:
     std::vector<AnalyticSolid> solids_;
+    std::vector<Primitive> first_; ///< of each solid, and past the last
 };
 
 } // namespace taihu

@@ -57,6 +57,47 @@ private:
     std::unique_ptr<LatticeField> prepared_;
 };
 
+/// The formula itself: F(p) = 1, where F is of degree 1 in p and convex, so that
+/// (F - 1) / |grad F| is the distance from the tangent plane where the ray to p leaves the solid:
+/// 0 on the surface, and outside never more than the distance.
+class SuperquadricProbe final : public FieldProbe {
+public:
+    SuperquadricProbe(const Superquadric& shape, const Similarity& at)
+        : shape_(shape), at_(at), back_(at.inverse()) {}
+
+    Nearest at(const Vec3& p) const override { return {of(0, p).value_m, 0}; }
+    Value of(Primitive, const Vec3& p) const override {
+        const Vec3 q = back_.point(p);
+        const Vec3& a = shape_.semi_axes_m;
+        const double level = 2 / shape_.around, up = 2 / shape_.vertical;
+        // Relative to the largest, so that no power overflows.
+        const Vec3 u{std::fabs(q.x) / a.x, std::fabs(q.y) / a.y, std::fabs(q.z) / a.z};
+        const double m = std::max({u.x, u.y, u.z, 1e-9});
+        const double px = std::pow(u.x / m, level), pz = std::pow(u.z / m, level);
+        const double r = std::pow(px + pz, 1 / level), pr = std::pow(r, up),
+                     py = std::pow(u.y / m, up);
+        const double f = std::pow(pr + py, 1 / up);
+        // dF/du_i, by the chain rule; powers of 0 are left out.
+        const auto part = [&](double power, double base) { return base > 0 ? power / base : 0.0; };
+        const double outer = std::pow(f, 1 - up),
+                     ring = part(pr, r) * outer * std::pow(r, 1 - level);
+        Vec3 g{ring * part(px, u.x / m) / a.x, outer * part(py, u.y / m) / a.y,
+               ring * part(pz, u.z / m) / a.z};
+        if (r == 0)
+            g.x = g.z = 0;
+        for (int axis = 0; axis < 3; ++axis)
+            g[axis] = std::copysign(g[axis], q[axis]);
+        const double slope = length(g);
+        return {(f * m - 1) / slope * at_.scale(), at_.direction(g / slope)};
+    }
+    void near(const Vec3&, double, std::vector<Primitive>& out) const override { out.push_back(0); }
+    std::optional<Sphere> ball(Primitive) const override { return std::nullopt; }
+
+private:
+    Superquadric shape_;
+    Similarity at_, back_;
+};
+
 } // namespace
 
 void check_superquadric(const Superquadric& s, const std::string& where) {
@@ -98,6 +139,10 @@ std::unique_ptr<LatticeField> SuperquadricField::on(const Lattice& lattice,
     ClosedMesh mesh =
         close_mesh(placed(superquadric_mesh(shape_, n), at_), "superquadric", CloseRule::none);
     return std::make_unique<OwnedLatticeField>(std::move(mesh), lattice, region);
+}
+
+std::unique_ptr<FieldProbe> SuperquadricField::probe(const Box&, double) const {
+    return std::make_unique<SuperquadricProbe>(shape_, at_);
 }
 
 } // namespace taihu

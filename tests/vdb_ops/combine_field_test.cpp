@@ -252,6 +252,10 @@ public:
     std::unique_ptr<LatticeField> on(const Lattice& l, const CoordBBox& region) const override {
         return std::make_unique<Prepared>(*this, of_->on(l, region));
     }
+    Primitive n_primitives() const override { return of_->n_primitives(); }
+    std::unique_ptr<FieldProbe> probe(const Box& region_m, double reach_m) const override {
+        return of_->probe(region_m, reach_m);
+    }
 
 private:
     struct Block final : BlockSampler {

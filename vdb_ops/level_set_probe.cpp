@@ -1,0 +1,78 @@
+#include <array>
+#include <cmath>
+
+#include "vdb_ops/level_set_field.h"
+#include "vdb_ops/level_set_probe_detail.h"
+#include "vdb_ops/placed_level_set_field.h"
+#include "vdb_ops/rasterize.h"
+#include "vdb_ops/redistance.h"
+
+namespace taihu {
+namespace {
+
+using openvdb::Coord;
+// Without a place in the tree's list of accessors, which costs more than a look-up saves.
+using Accessor = openvdb::tree::ValueAccessor<const openvdb::FloatTree, false>;
+
+double mix(double a, double b, double t) {
+    return a + (b - a) * t;
+}
+
+/// Trilinear between voxels, as one primitive.
+class LevelSetProbe final : public FieldProbe {
+public:
+    LevelSetProbe(openvdb::FloatGrid::ConstPtr grid, const Similarity& at)
+        : grid_(std::move(grid)), at_(at), back_(at.inverse()), own_(lattice_of(*grid_)) {}
+
+    Nearest at(const Vec3& p) const override { return {sample(p).value_m, 0}; }
+    Value of(Primitive, const Vec3& p) const override { return sample(p); }
+    void near(const Vec3&, double, std::vector<Primitive>& out) const override { out.push_back(0); }
+    std::optional<Sphere> ball(Primitive) const override { return std::nullopt; }
+
+private:
+    Value sample(const Vec3& p) const {
+        const Vec3 q = (back_.point(p) - own_.origin) / own_.voxel_m;
+        Coord c;
+        for (int axis = 0; axis < 3; ++axis)
+            c[axis] = static_cast<int>(std::floor(std::clamp(q[axis], -0x1p30, 0x1p30)));
+        const double x = q.x - c.x(), y = q.y - c.y(), z = q.z - c.z();
+        const Accessor accessor(grid_->tree());
+        std::array<double, 8> v;
+        for (int k = 0; k < 8; ++k)
+            v[static_cast<std::size_t>(k)] =
+                static_cast<double>(accessor.getValue(c.offsetBy(k >> 2, k >> 1 & 1, k & 1)));
+        const double v00 = mix(v[0], v[4], x), v01 = mix(v[1], v[5], x), v10 = mix(v[2], v[6], x),
+                     v11 = mix(v[3], v[7], x);
+        const double near = mix(v00, v10, y), far = mix(v01, v11, y);
+        const Vec3 gradient{
+            mix(mix(v[4] - v[0], v[6] - v[2], y), mix(v[5] - v[1], v[7] - v[3], y), z),
+            mix(v10 - v00, v11 - v01, z), far - near};
+        return {mix(near, far, z) * at_.scale(), at_.direction(gradient / own_.voxel_m)};
+    }
+
+    openvdb::FloatGrid::ConstPtr grid_;
+    Similarity at_, back_;
+    Lattice own_;
+};
+
+} // namespace
+
+std::unique_ptr<FieldProbe> level_set_probe(openvdb::FloatGrid::ConstPtr grid) {
+    return std::make_unique<LevelSetProbe>(std::move(grid), Similarity());
+}
+
+std::unique_ptr<FieldProbe> LevelSetField::probe(const Box&, double) const {
+    return level_set_probe(grid_);
+}
+
+std::unique_ptr<FieldProbe> PlacedLevelSetField::probe(const Box&, double reach_m) const {
+    const Lattice own = lattice_of(*grid_);
+    // The eight voxels around a point are within sqrt(3) of it.
+    const double half_width = reach_m / at_.scale() / own.voxel_m + 1.74;
+    auto grid = half_width > static_cast<double>(own.half_width_vox)
+                    ? widen_band(*grid_, static_cast<float>(half_width))
+                    : grid_;
+    return std::make_unique<LevelSetProbe>(std::move(grid), at_);
+}
+
+} // namespace taihu
