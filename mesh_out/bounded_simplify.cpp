@@ -15,11 +15,13 @@ namespace {
 
 constexpr const char* kWhere = "simplify";
 constexpr int kPasses = 3;
-constexpr double kBlockEdges = 32;      ///< edges along a block, as they are on average
-constexpr double kShift = 3. / 7;       ///< of a block from pass to pass
-constexpr double kCentredShare = 0.75;  ///< of the bound, for errors that balancing will centre
+constexpr double kBlockEdges = 32;     ///< edges along a block, as they are on average
+constexpr double kShift = 3. / 7;      ///< of a block from pass to pass
+constexpr double kCentredShare = 0.75; ///< of the bound, for errors that balancing will centre
 constexpr double kCountTolerance = 0.02;
 constexpr int kMostTrials = 24;
+constexpr int kMostFreezes = 3;
+constexpr double kFreeze = 1; ///< spacings round a crossing, where the input stays; then twice that
 constexpr double kFirstBound = 0.1; ///< of a spacing, where a search begins
 
 void require(bool holds, const std::string& message) {
@@ -64,41 +66,51 @@ BoundedSimplifier::BoundedSimplifier(LabelledMesh mesh, const FieldProbe& field,
     const CornerTable checked(mesh_.positions.size(), mesh_.triangles, kWhere);
 }
 
+LabelledMesh BoundedSimplifier::collapse(double bound_m, std::span<const std::uint8_t> frozen,
+                                         Progress* progress) const {
+    const FaceErrors errors(mesh_, field_, bound_m, settings_.spacing_m);
+    CornerTable table(mesh_.positions.size(), mesh_.triangles, kWhere);
+    Collapser::Rules rules;
+    rules.face.face_m = (settings_.balance ? kCentredShare : 1) * bound_m;
+    rules.face.rim_m = bound_m;
+    rules.face.centred = settings_.balance;
+    rules.face.turn_cosine = std::cos(settings_.max_turn_deg * std::numbers::pi / 180);
+    rules.off_m = 0.1 * bound_m;
+    Collapser collapser(table, mesh_.positions, frozen, errors, rules);
+    const double block = kBlockEdges * collapser.mean_edge_m();
+    for (int i = 0; i < kPasses; ++i)
+        collapser.pass(block, i * kShift * block, progress);
+    return compact(table, mesh_);
+}
+
 BoundedMesh BoundedSimplifier::level(double bound_m, LabelledMesh& collapsed,
                                      Progress* progress) const {
-    report_stage(progress, "simplify");
-    {
-        const FaceErrors errors(mesh_, field_, bound_m, settings_.spacing_m);
-        CornerTable table(mesh_.positions.size(), mesh_.triangles, kWhere);
-        Collapser::Rules rules;
-        rules.face.face_m = (settings_.balance ? kCentredShare : 1) * bound_m;
-        rules.face.rim_m = bound_m;
-        rules.face.centred = settings_.balance;
-        rules.face.turn_cosine = std::cos(settings_.max_turn_deg * std::numbers::pi / 180);
-        rules.off_m = 0.1 * bound_m;
-        Collapser collapser(table, mesh_.positions, errors, rules);
-        const double edge = collapser.mean_edge_m();
-        for (int i = 0; i < kPasses; ++i) {
-            const double block = kBlockEdges * edge;
-            collapser.pass(block, i * kShift * block, progress);
-        }
-        collapsed = compact(table, mesh_);
+    std::vector<std::uint8_t> frozen(mesh_.positions.size(), 0);
+    for (int trial = 0;; ++trial) {
+        report_stage(progress, "simplify");
+        collapsed = collapse(bound_m, frozen, progress);
+        report_stage(progress, "check the bound");
+        FaceErrors errors(collapsed, field_, bound_m, settings_.spacing_m);
+        BoundedSurface surface{CornerTable(collapsed.positions.size(), collapsed.triangles, kWhere),
+                               collapsed.positions,
+                               collapsed.positions,
+                               errors.labels(),
+                               errors,
+                               bound_m,
+                               settings_.spacing_m};
+        if (settings_.balance)
+            balance(surface);
+        Repaired repaired = repair(surface, progress);
+        if (repaired.crossings.empty() || trial == kMostFreezes)
+            return std::move(repaired.result);
+        // The input does not cross itself: keep it round the faces that do.
+        const double margin = kFreeze * settings_.spacing_m * (1 << trial);
+        for (const Sphere& s : repaired.crossings)
+            for (std::size_t v = 0; v < frozen.size(); ++v)
+                if (length_squared(mesh_.positions[v] - s.center) <=
+                    (s.radius_m + margin) * (s.radius_m + margin))
+                    frozen[v] = 1;
     }
-    FaceErrors errors(collapsed, field_, bound_m, settings_.spacing_m);
-    BoundedSurface surface{
-        CornerTable(collapsed.positions.size(), collapsed.triangles, kWhere),
-        collapsed.positions,
-        collapsed.positions,
-        errors.labels(),
-        errors,
-        bound_m,
-        settings_.spacing_m};
-    report_stage(progress, "check the bound");
-    if (settings_.balance)
-        balance(surface);
-    BoundedMesh out = repair(surface, progress);
-    report_fraction(progress, 1);
-    return out;
 }
 
 BoundedMesh BoundedSimplifier::within(double bound_m, Progress* progress) {
@@ -147,9 +159,9 @@ BoundedMesh BoundedSimplifier::to_triangles(std::size_t n, Progress* progress) {
         else
             bound = std::min(guess, 0.95 * coarse);
     }
-    throw Error(Fault::numeric,
-                std::string(kWhere) + ": found no bound that leaves " + std::to_string(n) +
-                    " triangles, the last was " + rounded(bound) + " m; ask for another count");
+    throw Error(Fault::numeric, std::string(kWhere) + ": found no bound that leaves " +
+                                    std::to_string(n) + " triangles, the last was " +
+                                    rounded(bound) + " m; ask for another count");
 }
 
 } // namespace taihu

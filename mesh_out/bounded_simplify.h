@@ -1,5 +1,7 @@
 #pragma once
 #include <cstddef>
+#include <cstdint>
+#include <span>
 #include <vector>
 
 #include "mesh_out/labelled_mesh.h"
@@ -9,9 +11,9 @@
 namespace taihu {
 
 struct BoundedSettings {
-    double spacing_m = 0;      ///< of the lattice that the mesh was made on [m], > 0
-    bool balance = true;       ///< move vertices off the surface so that errors fall on both sides
-    double max_turn_deg = 60;  ///< between a new face and the field's normal, (0, 90]
+    double spacing_m = 0;     ///< of the lattice that the mesh was made on [m], > 0
+    bool balance = true;      ///< move vertices off the surface so that errors fall on both sides
+    double max_turn_deg = 60; ///< between a new face and the field's normal, (0, 90]
 };
 
 /// Where the stated bound is not held: walls, fins and slits that the mesh does not resolve.
@@ -38,7 +40,8 @@ struct BoundedMesh {
 /// another: ask for ascending bounds. The same mesh on any number of threads.
 class BoundedSimplifier {
 public:
-    /// \param mesh  closed 2-manifold, its vertices on the primitives of their labels; those without
+    /// \param mesh  closed 2-manifold, its vertices on the primitives of their labels; those
+    /// without
     ///   a label, or off their primitives, go first.
     /// \param field  a probe of the whole mesh with a reach of 8 spacings and 8 of the largest
     ///   bound; must outlive this.
@@ -55,6 +58,8 @@ public:
     BoundedMesh to_triangles(std::size_t n, Progress* progress = nullptr);
 
 private:
+    LabelledMesh collapse(double bound_m, std::span<const std::uint8_t> frozen,
+                          Progress* progress) const;
     /// \param collapsed  becomes the surface before it is balanced and mended.
     BoundedMesh level(double bound_m, LabelledMesh& collapsed, Progress* progress) const;
 

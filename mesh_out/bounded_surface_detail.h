@@ -34,7 +34,11 @@ struct BoundedSurface {
 void balance(BoundedSurface& surface);
 
 /// Makes the bound hold and crossings vanish: moved vertices go back, faces are split by new
-/// vertices on the solid's surface. What neither mends is named in the result.
-BoundedMesh repair(BoundedSurface& surface, Progress* progress);
+/// vertices on the solid's surface. What neither mends is named.
+struct Repaired {
+    BoundedMesh result;
+    std::vector<Sphere> crossings; ///< round faces that still meet others
+};
+Repaired repair(BoundedSurface& surface, Progress* progress);
 
 } // namespace taihu

@@ -58,9 +58,10 @@ Collapser::Entry Collapser::Buckets::pop() {
     return entry;
 }
 
-Collapser::Collapser(CornerTable& table, std::span<const Vec3> positions, const FaceErrors& errors,
+Collapser::Collapser(CornerTable& table, std::span<const Vec3> positions,
+                     std::span<const std::uint8_t> frozen, const FaceErrors& errors,
                      const Rules& rules)
-    : table_(table), positions_(positions), errors_(errors), rules_(rules),
+    : table_(table), positions_(positions), frozen_(frozen), errors_(errors), rules_(rules),
       quadrics_(positions.size()), stamps_(positions.size(), 0), owners_(positions.size(), 0),
       inner_(positions.size(), 0), open_(positions.size(), 1), off_(positions.size(), 0),
       clear_m_(positions.size(), 0), slopes_(positions.size()) {
@@ -120,8 +121,7 @@ Collapser::Blocks Collapser::divide(double block_m, double shift_m) {
         if (table_.has_vertex(v))
             box.include(positions_[v]);
     const Vec3 size = box.size() + Vec3{1, 1, 1} * shift_m;
-    const double side =
-        std::max(block_m, std::cbrt(size.x * size.y * size.z / kMostBlocks));
+    const double side = std::max(block_m, std::cbrt(size.x * size.y * size.z / kMostBlocks));
     const auto count = [&](double x) { return static_cast<std::uint32_t>(x / side) + 1; };
     const std::uint32_t ny = count(size.y), nz = count(size.z), n = count(size.x) * ny * nz;
     Blocks blocks;
@@ -204,13 +204,14 @@ void Collapser::run(std::span<const std::uint32_t> vertices, Buckets& queue) {
         if (!table_.has_vertex(v))
             continue;
         bool open = !inner_[v];
-        each_neighbour(v, [&](std::uint32_t u) { open = open || owners_[u] != owners_[v] || !inner_[u]; });
+        each_neighbour(
+            v, [&](std::uint32_t u) { open = open || owners_[u] != owners_[v] || !inner_[u]; });
         open_[v] = open;
     }
 }
 
 bool Collapser::may_move(std::uint32_t a, std::uint32_t b) const {
-    if (off_[b])
+    if (off_[b] || frozen_[a])
         return false;
     const std::uint32_t la = errors_.labels()[a], lb = errors_.labels()[b];
     return off_[a] || (errors_.within(la, lb) && errors_.n_primitives(la) < PrimitiveSet::kMost);
@@ -256,10 +257,10 @@ bool Collapser::may_fit(std::uint32_t a, std::uint32_t b) const {
     if (s.shape == FaceErrors::kNone || s.shape != t.shape)
         return true;
     const Vec3 d = positions_[b] - positions_[a];
-    const double at_middle = ((s.gradient[0] - t.gradient[0]) * d.x +
-                              (s.gradient[1] - t.gradient[1]) * d.y +
-                              (s.gradient[2] - t.gradient[2]) * d.z) /
-                             8;
+    const double at_middle =
+        ((s.gradient[0] - t.gradient[0]) * d.x + (s.gradient[1] - t.gradient[1]) * d.y +
+         (s.gradient[2] - t.gradient[2]) * d.z) /
+        8;
     return std::abs(at_middle) <= kHope * (rules_.face.centred ? 2 : 1) * rules_.face.face_m;
 }
 
@@ -298,8 +299,8 @@ bool Collapser::legal(std::uint32_t b, const Ring& ring) const {
             continue;
         rules.exact_corners = !off_[v] && !off_[w];
         if (errors_.bound({positions_[b], positions_[v], positions_[w]},
-                          {labels[b], labels[v], labels[w]}, rules) ==
-            std::numeric_limits<double>::infinity())
+                          {labels[b], labels[v], labels[w]},
+                          rules) == std::numeric_limits<double>::infinity())
             return false;
     }
     return true;

@@ -23,8 +23,9 @@ public:
         double off_m = 0;            ///< vertices farther from their primitives go first
     };
 
-    Collapser(CornerTable& table, std::span<const Vec3> positions, const FaceErrors& errors,
-              const Rules& rules);
+    /// \param frozen  per vertex: stays.
+    Collapser(CornerTable& table, std::span<const Vec3> positions,
+              std::span<const std::uint8_t> frozen, const FaceErrors& errors, const Rules& rules);
     /// One pass over all blocks of one lattice. \throws Error cancelled.
     void pass(double block_m, double shift_m, Progress* progress);
     /// The mean length of the edges that are left.
@@ -71,6 +72,7 @@ private:
 
     CornerTable& table_;
     std::span<const Vec3> positions_;
+    std::span<const std::uint8_t> frozen_;
     const FaceErrors& errors_;
     Rules rules_;
     std::vector<Quadric> quadrics_;

@@ -52,41 +52,39 @@ CornerTable::CornerTable(std::size_t n_vertices, std::span<const Triangle> trian
     opposites_.assign(vertices_.size(), kNone);
     const Incidence incidence(n_vertices, vertices_);
     std::atomic<bool> broken{false};
-    tbb::parallel_for(
-        tbb::blocked_range<std::size_t>(0, n_vertices, 4096), [&](const auto& range) {
-            for (std::size_t v = range.begin(); v < range.end(); ++v) {
-                const auto around = incidence.of(v);
-                if (!around.empty())
-                    corners_[v] = around.front();
-                for (const std::uint32_t c : around) {
-                    const std::uint32_t to = vertices_[next(c)];
-                    int n_out = 0, n_in = 0;
-                    for (const std::uint32_t d : around) {
-                        n_out += vertices_[next(d)] == to;
-                        if (vertices_[previous(d)] == to) {
-                            opposites_[previous(c)] = next(d);
-                            ++n_in;
-                        }
+    tbb::parallel_for(tbb::blocked_range<std::size_t>(0, n_vertices, 4096), [&](const auto& range) {
+        for (std::size_t v = range.begin(); v < range.end(); ++v) {
+            const auto around = incidence.of(v);
+            if (!around.empty())
+                corners_[v] = around.front();
+            for (const std::uint32_t c : around) {
+                const std::uint32_t to = vertices_[next(c)];
+                int n_out = 0, n_in = 0;
+                for (const std::uint32_t d : around) {
+                    n_out += vertices_[next(d)] == to;
+                    if (vertices_[previous(d)] == to) {
+                        opposites_[previous(c)] = next(d);
+                        ++n_in;
                     }
-                    if (n_out != 1 || n_in != 1)
-                        broken = true;
                 }
+                if (n_out != 1 || n_in != 1)
+                    broken = true;
             }
-        });
+        }
+    });
     if (broken)
         refuse();
     // One walk round each vertex must meet all of its corners.
-    tbb::parallel_for(
-        tbb::blocked_range<std::size_t>(0, n_vertices, 4096), [&](const auto& range) {
-            for (std::size_t v = range.begin(); v < range.end(); ++v) {
-                std::size_t n = 0;
-                if (corners_[v] != kNone)
-                    for (std::uint32_t c = corners_[v]; n == 0 || c != corners_[v]; c = swing(c))
-                        ++n;
-                if (n != incidence.of(v).size())
-                    broken = true;
-            }
-        });
+    tbb::parallel_for(tbb::blocked_range<std::size_t>(0, n_vertices, 4096), [&](const auto& range) {
+        for (std::size_t v = range.begin(); v < range.end(); ++v) {
+            std::size_t n = 0;
+            if (corners_[v] != kNone)
+                for (std::uint32_t c = corners_[v]; n == 0 || c != corners_[v]; c = swing(c))
+                    ++n;
+            if (n != incidence.of(v).size())
+                broken = true;
+        }
+    });
     if (broken)
         refuse();
 }
@@ -144,7 +142,8 @@ void CornerTable::collapse(std::uint32_t c, const Ring& ring) {
 }
 
 void CornerTable::split(std::uint32_t c) {
-    // Triangle (a, p, q) of c and (b, q, p) beyond become (a, p, m), (a, m, q), (b, q, m), (b, m, p).
+    // Triangle (a, p, q) of c and (b, q, p) beyond become (a, p, m), (a, m, q), (b, q, m), (b, m,
+    // p).
     const std::uint32_t d = opposites_[c], cp = next(c), cq = previous(c), dq = next(d),
                         dp = previous(d);
     const std::uint32_t a = vertices_[c], q = vertices_[cq], b = vertices_[d], p = vertices_[dp];
@@ -153,14 +152,14 @@ void CornerTable::split(std::uint32_t c) {
     const std::uint32_t beyond_cp = opposites_[cp], beyond_dq = opposites_[dq];
     vertices_.insert(vertices_.end(), {a, m, q, b, m, p});
     opposites_.resize(vertices_.size());
-    vertices_[cq] = m; // c, cp, cq: a, p, m
-    vertices_[dp] = m; // d, dq, dp: b, q, m
+    vertices_[cq] = m;      // c, cp, cq: a, p, m
+    vertices_[dp] = m;      // d, dq, dp: b, q, m
     link(e + 1, beyond_cp); // opposite to m in (a, m, q): the edge q a
     link(cp, e + 2);        // the edge m a, between (a, p, m) and (a, m, q)
     link(f + 1, beyond_dq);
     link(dq, f + 2);
-    link(c, f);  // the edge p m
-    link(d, e);  // the edge q m
+    link(c, f); // the edge p m
+    link(d, e); // the edge q m
     corners_.push_back(cq);
     corners_[p] = cp;
     corners_[q] = dq;

@@ -10,8 +10,8 @@ namespace taihu {
 
 /// A closed 2-manifold as a corner table: corner c belongs to triangle c / 3; two numbers a corner
 /// and one a vertex. Collapses and splits are local; what is gone is left as a gap.
-/// Source: Rossignac 2001, "3D compression made simple: Edgebreaker on a corner-table" (from memory,
-/// unchecked).
+/// Source: Rossignac 2001, "3D compression made simple: Edgebreaker on a corner-table" (from
+/// memory, unchecked).
 class CornerTable {
 public:
     static constexpr std::uint32_t kNone = 0xffffffffu;

@@ -12,9 +12,11 @@ namespace taihu {
 namespace {
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
-constexpr double kTouch = 0.02;   ///< of a spacing: deeper is in, for primitives that only pass by
+constexpr double kTouch = 0.02; ///< of a spacing: deeper is in, for primitives that only pass by
 constexpr std::size_t kMostSteps = 12; ///< along an edge, of samples
 constexpr int kMostHalvings = 2;
+constexpr double kSmallest = 0.2;     ///< of a spacing: parts of faces are not divided further
+constexpr double kSteep = 0.95;       ///< gradients of distances have length 1
 constexpr double kPlanarMargin = 1.1; ///< rims of other surfaces are bent; planes are not
 
 Vec3 middle(const FaceErrors::Corners& f) {
@@ -27,8 +29,8 @@ double radius_about(const Vec3& m, const FaceErrors::Corners& f) {
 }
 
 double longest_edge(const FaceErrors::Corners& f) {
-    return std::sqrt(std::max({length_squared(f[0] - f[1]), length_squared(f[1] - f[2]),
-                               length_squared(f[2] - f[0])}));
+    return std::sqrt(std::max(
+        {length_squared(f[0] - f[1]), length_squared(f[1] - f[2]), length_squared(f[2] - f[0])}));
 }
 
 std::array<FaceErrors::Corners, 4> quarters(const FaceErrors::Corners& f) {
@@ -62,72 +64,60 @@ double FaceErrors::bound(const Corners& face, const Labels& labels, const Rules&
         return kInfinity;
     const Vec3 m = middle(face);
     if (rules.turn_cosine > -1) {
-        const Vec3 n = cross(face[1] - face[0], face[2] - face[0]), g = of(shape, m).gradient;
+        const Vec3 n = cross(face[1] - face[0], face[2] - face[0]),
+                   g = shapes_[shape].is_ball ? of(shape, m).gradient : range.gradient;
         if (dot(n, g) < rules.turn_cosine * length(n) * length(g))
             return kInfinity;
     }
+    // Whose surface comes near the face, or near where it projects to.
     const double radius = radius_about(m, face), reach = radius + most + kTouch * spacing_;
-    int n_active = 0;
-    std::uint32_t active = kNone;
-    std::array<int, 3> lo{}, hi{};
+    const auto is_near = [&](const Shape& s) {
+        if (!s.is_ball)
+            return rules.clear_m <= 2 * radius + reach &&
+                   std::abs(field_.of(s.primitive, m).value_m) <= reach;
+        const double d2 = length_squared(m - s.center), far = s.radius + reach,
+                     deep = s.radius - reach;
+        return d2 <= far * far && (deep <= 0 || d2 >= deep * deep);
+    };
+    std::uint32_t active = kNone; // has a rim with it near the face
+    std::array<int, 3> lo{}, hi{}, c{};
     for (int a = 0; a < 3; ++a) {
         lo[a] = coordinate(std::min({face[0][a], face[1][a], face[2][a]}), a);
         hi[a] = coordinate(std::max({face[0][a], face[1][a], face[2][a]}), a);
     }
-    std::array<int, 3> c{};
     for (c[0] = lo[0]; c[0] <= hi[0]; ++c[0])
         for (c[1] = lo[1]; c[1] <= hi[1]; ++c[1])
-            for (c[2] = lo[2]; c[2] <= hi[2]; ++c[2]) {
-                const std::uint32_t list = cells_[cell_of(c)];
-                if (list == kNone)
-                    continue;
-                for (std::uint32_t i = first_[list]; i < first_[list + 1]; ++i) {
-                    const std::uint32_t other = near_[i];
-                    const Shape& s = shapes_[other];
-                    if (other == shape)
+            for (c[2] = lo[2]; c[2] <= hi[2]; ++c[2])
+                for (const std::uint32_t other : near(c)) {
+                    if (other == shape || !is_near(shapes_[other]))
                         continue;
-                    if (s.is_ball) {
-                        const double d2 = length_squared(m - s.center), far = s.radius + reach,
-                                     deep = s.radius - reach;
-                        if (d2 > far * far || (deep > 0 && d2 < deep * deep))
-                            continue;
-                    } else if (rules.clear_m > 2 * radius + reach ||
-                               std::abs(field_.of(s.primitive, m).value_m) > reach) {
-                        continue;
-                    }
-                    bool is_labelled = false;
-                    for (const std::uint32_t l : labels)
-                        is_labelled = is_labelled || sets_[l].has(other);
-                    const double past =
-                        against(shape, range, other, is_labelled, face, labels, rules);
+                    const double past = against(shape, range, other, face, labels, rules);
                     most = std::max(most, past);
                     // A third primitive may cut off the rim of two.
-                    if (past > 0 && other != active) {
-                        ++n_active;
-                        active = other;
-                    }
-                    if (most == kInfinity || (rules.may_pierce && n_active > 1))
+                    const bool cut =
+                        rules.may_pierce && past > 0 && active != kNone && active != other;
+                    if (most == kInfinity || cut)
                         return kInfinity;
+                    if (past > 0)
+                        active = other;
                 }
-            }
     return most;
 }
 
 double FaceErrors::clearance(const Vec3& p, std::uint32_t label) const {
     const std::array<int, 3> at = {coordinate(p.x, 0), coordinate(p.y, 1), coordinate(p.z, 2)};
-    const std::uint32_t list = cells_[cell_of(at)];
+    const auto list = near(at);
     double least = pad_; // the lists know no more
-    if (list == kNone)
-        return least;
     const double off_center = length(p - center_of(at));
-    for (std::uint32_t i = first_[list]; i < first_[list + 1]; ++i) {
-        const Shape& s = shapes_[near_[i]];
-        if (s.is_ball || sets_[label].has(near_[i]))
+    for (const std::uint32_t& shape : list) {
+        const Shape& s = shapes_[shape];
+        if (s.is_ball || sets_[label].has(shape))
             continue;
-        const double at_least = std::abs(static_cast<double>(center_values_[i])) - off_center;
-        least = std::min(least, at_least > 2 * spacing_
-                                    ? at_least
-                                    : std::abs(field_.of(s.primitive, p).value_m));
+        const double value = center_values_[static_cast<std::size_t>(&shape - near_.data())];
+        const double at_least = std::abs(value) - off_center;
+        least =
+            std::min(least, at_least > 2 * spacing_ ? at_least
+                                                    : std::abs(field_.of(s.primitive, p).value_m));
     }
     return least;
 }
@@ -168,19 +158,32 @@ FaceErrors::Range FaceErrors::range(std::uint32_t shape, const Corners& f,
     const double nearest =
         length(closest_point_on_triangle(s.center, f[0], f[1], f[2]) - s.center) - s.radius;
     const double farthest = radius_about(s.center, f) - s.radius;
-    return s.sign > 0 ? Range{nearest, farthest} : Range{-farthest, -nearest};
+    return s.sign > 0 ? Range{nearest, farthest, {}} : Range{-farthest, -nearest, {}};
+}
+
+/// Where a primitive has creases of its own, or a blend, its values under-read and are not steep:
+/// then the way to where it is 0 counts.
+double FaceErrors::distance_to(Primitive primitive, const Vec3& p, Vec3& gradients) const {
+    const FieldProbe::Value at = field_.of(primitive, p);
+    gradients += at.gradient;
+    const double slope = length(at.gradient);
+    if (slope > kSteep)
+        return at.value_m;
+    if (const auto y = onto(field_, PrimitiveSet(primitive), p, 2 * pad_))
+        return std::copysign(std::max(length(*y - p), std::abs(at.value_m)), at.value_m);
+    return slope > 0.1 ? at.value_m / slope : at.value_m;
 }
 
 FaceErrors::Range FaceErrors::sampled_range(const Shape& shape, const Corners& f,
                                             const CornerValues* known, double give_up_m) const {
-    const std::size_t n = std::clamp(
-        static_cast<std::size_t>(std::ceil(longest_edge(f) / (1.6 * spacing_))), std::size_t{2},
-        kMostSteps);
+    const std::size_t n =
+        std::clamp(static_cast<std::size_t>(std::ceil(longest_edge(f) / (1.6 * spacing_))),
+                   std::size_t{2}, kMostSteps);
     std::array<double, (kMostSteps + 1) * (kMostSteps + 1)> values;
     const auto at = [&](std::size_t u, std::size_t v) -> double& {
         return values[u * (kMostSteps + 1) + v];
     };
-    Range r{kInfinity, -kInfinity};
+    Range r{kInfinity, -kInfinity, {}};
     for (std::size_t u = 0; u <= n; ++u)
         for (std::size_t v = 0; u + v <= n; ++v) {
             const bool corner = u == n || v == n || u + v == 0;
@@ -190,11 +193,8 @@ FaceErrors::Range FaceErrors::sampled_range(const Shape& shape, const Corners& f
             } else {
                 const double x = static_cast<double>(u) / static_cast<double>(n),
                              y = static_cast<double>(v) / static_cast<double>(n);
-                const auto sample =
-                    field_.of(shape.primitive, f[1] * x + f[2] * y + f[0] * (1 - x - y));
-                // Values of blends under-read where they are not steep.
-                const double slope = length(sample.gradient);
-                d = slope > 0.1 ? sample.value_m / std::min(slope, 1.) : sample.value_m;
+                d = distance_to(shape.primitive, f[1] * x + f[2] * y + f[0] * (1 - x - y),
+                                r.gradient);
             }
             at(u, v) = d;
             r.lo = std::min(r.lo, d);
@@ -212,20 +212,21 @@ FaceErrors::Range FaceErrors::sampled_range(const Shape& shape, const Corners& f
             if (v > 0 && u + v < n)
                 bend = std::max(bend, std::abs(at(u, v - 1) - 2 * at(u, v) + at(u, v + 1)));
             if (u > 0 && v > 0)
-                bend = std::max(bend, std::abs(at(u - 1, v + 1) - 2 * at(u, v) +
-                                               at(u + 1, v - 1)) *
-                                          (u + v <= n ? 1. : 0.));
+                bend = std::max(bend, std::abs(at(u - 1, v + 1) - 2 * at(u, v) + at(u + 1, v - 1)));
         }
-    return {r.lo - (r.lo < 0 ? bend / 8 : 0), r.hi + (r.hi > 0 ? bend / 8 : 0)};
+    return {r.lo - (r.lo < 0 ? bend / 8 : 0), r.hi + (r.hi > 0 ? bend / 8 : 0), r.gradient};
 }
 
 double FaceErrors::against(std::uint32_t own, const Range& own_range, std::uint32_t other,
-                           bool is_labelled, const Corners& face, const Labels& labels,
-                           const Rules& rules) const {
+                           const Corners& face, const Labels& labels, const Rules& rules) const {
     CornerValues corners{};
-    for (std::size_t k = 0; k < 3; ++k)
-        if (!rules.exact_corners || !sets_[labels[k]].has(other))
+    bool is_labelled = false;
+    for (std::size_t k = 0; k < 3; ++k) {
+        const bool has = sets_[labels[k]].has(other);
+        is_labelled = is_labelled || has;
+        if (!rules.exact_corners || !has)
             corners[k] = of(other, face[k]).value_m;
+    }
     const double lo = std::min({corners[0], corners[1], corners[2]}),
                  hi = std::max({corners[0], corners[1], corners[2]});
     const double tolerance = kTouch * spacing_;
@@ -251,8 +252,8 @@ double FaceErrors::against(std::uint32_t own, const Range& own_range, std::uint3
 
 /// Of the part of a face that lies past the rim of two primitives, an upper bound of the distance
 /// to that rim; 0 when there is no such part.
-double FaceErrors::meeting(const Meeting& pair, const Corners& face, const Range& a,
-                           const Range& b, int depth) const {
+double FaceErrors::meeting(const Meeting& pair, const Corners& face, const Range& a, const Range& b,
+                           int depth) const {
     double own = pair.turn > 0 ? a.hi : -a.lo;
     const double other = pair.turn > 0 ? b.hi : -b.lo;
     if (pair.rules.centred)
@@ -267,8 +268,8 @@ double FaceErrors::meeting(const Meeting& pair, const Corners& face, const Range
         return kInfinity;
     double most = 0;
     for (const Corners& part : quarters(face)) {
-        most = std::max(most, meeting(pair, part, range(pair.own, part), range(pair.other, part),
-                                      depth + 1));
+        most = std::max(
+            most, meeting(pair, part, range(pair.own, part), range(pair.other, part), depth + 1));
         if (most == kInfinity)
             return most;
     }
@@ -311,16 +312,15 @@ double FaceErrors::past_rim(const Meeting& pair, const Corners& face, double own
     return std::hypot(z - z_deep, std::sqrt(height2) - std::sqrt(height2_deep));
 }
 
-double FaceErrors::searched(const Corners& face, double enough_m) const {
-    const double size = longest_edge(face);
+double FaceErrors::searched(const Corners& face, double enough_m, double give_up_m) const {
     const auto y = surface_point_near(field_, middle(face), 4 * pad_);
     const double far = y ? radius_about(*y, face) : kInfinity;
-    if (far <= enough_m || size < 0.1 * spacing_)
+    if (far <= enough_m || longest_edge(face) < kSmallest * spacing_)
         return far;
     double most = 0;
     for (const Corners& part : quarters(face)) {
-        most = std::max(most, searched(part, enough_m));
-        if (most > enough_m)
+        most = std::max(most, searched(part, enough_m, give_up_m));
+        if (most > give_up_m)
             return most;
     }
     return most;

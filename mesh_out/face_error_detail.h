@@ -37,6 +37,7 @@ public:
     /// The range of values of a primitive over a face [m].
     struct Range {
         double lo = 0, hi = 0;
+        Vec3 gradient; ///< summed over samples; 0 for balls
         double most() const { return std::max(-lo, hi); }
     };
     /// What one face is judged by.
@@ -66,8 +67,9 @@ public:
     std::span<const std::uint32_t> shapes(std::uint32_t label) const { return sets_[label].all(); }
 
     /// An upper bound of the distances of all points of a face by surface points found near it;
-    /// slow, and right whatever the labels. Stops looking where it stays below `enough_m`.
-    double searched(const Corners& face, double enough_m) const;
+    /// slow, and right whatever the labels. Parts are not divided where it is at most `enough_m`;
+    /// beyond `give_up_m` the search ends.
+    double searched(const Corners& face, double enough_m, double give_up_m = kFar) const;
 
     static constexpr std::uint32_t kNone = 0xffffffffu;
     static constexpr double kFar = 1e300;
@@ -95,13 +97,20 @@ private:
     using CornerValues = std::array<double, 3>;
     Range range(std::uint32_t shape, const Corners& face, const CornerValues* known = nullptr,
                 double give_up_m = kFar) const;
+    double distance_to(Primitive primitive, const Vec3& p, Vec3& gradients) const;
     Range sampled_range(const Shape& shape, const Corners& face, const CornerValues* known,
                         double give_up_m) const;
     double past_rim(const Meeting& meeting, const Corners& face, double own, double other) const;
     double meeting(const Meeting& meeting, const Corners& face, const Range& own,
                    const Range& other, int depth) const;
-    double against(std::uint32_t own, const Range& own_range, std::uint32_t other, bool is_labelled,
+    double against(std::uint32_t own, const Range& own_range, std::uint32_t other,
                    const Corners& face, const Labels& labels, const Rules& rules) const;
+    std::span<const std::uint32_t> near(const std::array<int, 3>& cell) const {
+        const std::uint32_t list = cells_[cell_of(cell)];
+        if (list == kNone)
+            return {};
+        return std::span(near_).subspan(first_[list], first_[list + 1] - first_[list]);
+    }
     std::size_t cell_of(const std::array<int, 3>& c) const {
         return (static_cast<std::size_t>(c[0]) * n_[1] + static_cast<std::size_t>(c[1])) * n_[2] +
                static_cast<std::size_t>(c[2]);
@@ -115,9 +124,9 @@ private:
     double spacing_, pad_, cell_ = 0;
     Vec3 origin_;
     std::array<std::size_t, 3> n_{};
-    std::vector<std::uint32_t> cells_;       ///< number of the list of a cell, kNone far away
+    std::vector<std::uint32_t> cells_;        ///< number of the list of a cell, kNone far away
     std::vector<std::uint32_t> first_, near_; ///< shapes near each listed cell
-    std::vector<float> center_values_; ///< of these at the cell's centre, of balls 0
+    std::vector<float> center_values_;        ///< of these at the cell's centre, of balls 0
     std::vector<Shape> shapes_;
     std::vector<PrimitiveSet> sets_; ///< of shapes, by label number
     std::vector<std::uint32_t> labels_;

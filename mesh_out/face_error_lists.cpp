@@ -29,8 +29,8 @@ FaceErrors::FaceErrors(const LabelledMesh& mesh, const FieldProbe& field, double
         box.include(p);
     box = box.dilated(pad_);
     const Vec3 size = box.size();
-    cell_ = std::max({kCellSpacings * spacing_m, 4 * bound_m,
-                      std::cbrt(size.x * size.y * size.z / kMostCells)});
+    cell_ = std::max(
+        {kCellSpacings * spacing_m, 4 * bound_m, std::cbrt(size.x * size.y * size.z / kMostCells)});
     origin_ = box.lo;
     for (int a = 0; a < 3; ++a)
         n_[static_cast<std::size_t>(a)] = static_cast<std::size_t>(size[a] / cell_) + 1;

@@ -12,12 +12,10 @@
 namespace taihu {
 
 double BoundedSurface::error_of(std::size_t face) const {
-    const FaceErrors::Rules rules{.face_m = bound_m,
-                                  .rim_m = bound_m,
-                                  .exact_corners = false,
-                                  .may_pierce = true};
+    const FaceErrors::Rules rules{
+        .face_m = bound_m, .rim_m = bound_m, .exact_corners = false, .may_pierce = true};
     const double known = errors.bound(corners(face), labels_of(face), rules);
-    return known <= bound_m ? known : errors.searched(corners(face), bound_m);
+    return known <= bound_m ? known : errors.searched(corners(face), bound_m, bound_m);
 }
 
 namespace {
@@ -32,7 +30,7 @@ public:
         errors_.assign(s_.table.n_triangles(), 0);
         dirty_.assign(errors_.size(), 1);
     }
-    BoundedMesh run(Progress* progress);
+    Repaired run(Progress* progress);
 
 private:
     void measure();
@@ -47,8 +45,8 @@ private:
     BoundedSurface& s_;
     std::vector<double> errors_; ///< per face
     std::vector<std::uint8_t> dirty_;
-    std::size_t n_old_;                  ///< vertices before any split
-    std::vector<Vec3> middles_;          ///< of the edges that new vertices split
+    std::size_t n_old_;                   ///< vertices before any split
+    std::vector<Vec3> middles_;           ///< of the edges that new vertices split
     std::vector<std::uint8_t> retreated_; ///< new vertices that went there
 };
 
@@ -194,8 +192,9 @@ bool Repair::split(std::size_t face) {
     return false;
 }
 
-BoundedMesh Repair::run(Progress* progress) {
-    BoundedMesh out;
+Repaired Repair::run(Progress* progress) {
+    Repaired repaired;
+    BoundedMesh& out = repaired.result;
     out.bound_m = s_.bound_m;
     std::vector<std::uint8_t> meets, bad;
     for (int round = 0;; ++round) {
@@ -218,12 +217,19 @@ BoundedMesh Repair::run(Progress* progress) {
         out.mesh.triangles.push_back(s_.table.triangle(f));
         if (!bad[f])
             out.error_m = std::max(out.error_m, errors_[f]);
+        if (meets[f]) {
+            const FaceErrors::Corners p = s_.corners(f);
+            const Vec3 middle = (p[0] + p[1] + p[2]) / 3;
+            repaired.crossings.push_back(
+                {middle,
+                 std::max({length(p[0] - middle), length(p[1] - middle), length(p[2] - middle)})});
+        }
     }
     out.unresolved = places(bad);
     out.mesh.positions = s_.positions;
     for (const std::uint32_t l : s_.labels)
         out.mesh.labels.push_back(s_.errors.primitives(l));
-    return out;
+    return repaired;
 }
 
 /// Bad faces that hang together are one place.
@@ -241,7 +247,7 @@ std::vector<UnresolvedPlace> Repair::places(const std::vector<std::uint8_t>& bad
         while (!open.empty()) {
             const std::size_t f = open.back();
             open.pop_back();
-            error = std::max(error, errors_[f]);
+            error = std::max(error, s_.errors.searched(s_.corners(f), s_.bound_m));
             for (const std::uint32_t v : s_.table.triangle(f)) {
                 box.include(s_.positions[v]);
                 std::uint32_t c = s_.table.corner(v);
@@ -261,7 +267,7 @@ std::vector<UnresolvedPlace> Repair::places(const std::vector<std::uint8_t>& bad
 
 } // namespace
 
-BoundedMesh repair(BoundedSurface& surface, Progress* progress) {
+Repaired repair(BoundedSurface& surface, Progress* progress) {
     return Repair(surface).run(progress);
 }
 

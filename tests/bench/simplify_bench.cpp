@@ -56,12 +56,13 @@ struct Row {
 Row print_row(const Scene& scene, const std::string& name, const TriMesh& mesh, double bound) {
     Row row{surface_errors(scene.solid, scene.points, mesh, kDense, bound), certify(mesh)};
     const auto& [e, c] = row;
-    fmt::print("{:<26} {:>8} | {:.3f} {:.3f} {:.4f} | {:.3f} {:.3f} | {:.3f} {:.3f} {:.3f} | {:4.1f} "
-               "| {} {} {} {}\n",
-               name, mesh.triangles.size(), e.mesh.most(), e.mesh.quantile(.999), e.mesh.rms(),
-               e.face.most(), e.face.quantile(.999), e.rim.most(), e.rim.quantile(.999),
-               e.rim.quantile(.99), e.turn_deg.quantile(.99), c.n_self_intersections,
-               c.n_nonmanifold_edges, c.n_components, c.euler);
+    fmt::print(
+        "{:<26} {:>8} | {:.3f} {:.3f} {:.4f} | {:.3f} {:.3f} | {:.3f} {:.3f} {:.3f} | {:4.1f} "
+        "| {} {} {} {}\n",
+        name, mesh.triangles.size(), e.mesh.most(), e.mesh.quantile(.999), e.mesh.rms(),
+        e.face.most(), e.face.quantile(.999), e.rim.most(), e.rim.quantile(.999),
+        e.rim.quantile(.99), e.turn_deg.quantile(.99), c.n_self_intersections,
+        c.n_nonmanifold_edges, c.n_components, c.euler);
     std::fflush(stdout);
     return row;
 }
@@ -99,7 +100,8 @@ TriMesh by_meshoptimizer(const LabelledMesh& dense, std::size_t n, double& secon
         indices.insert(indices.end(), t.begin(), t.end());
     const double start = processor_s();
     left.resize(meshopt_simplify(left.data(), indices.data(), indices.size(), positions.data(),
-                                 mesh.positions.size(), 3 * sizeof(float), 3 * n, 1e9f, 0, nullptr));
+                                 mesh.positions.size(), 3 * sizeof(float), 3 * n, 1e9f, 0,
+                                 nullptr));
     seconds = processor_s() - start;
     mesh.triangles.clear();
     for (std::size_t i = 0; i < left.size(); i += 3)
@@ -126,7 +128,8 @@ std::size_t n_unnamed(const Row& row, const BoundedMesh& mesh) {
             for (auto v : tm.triangles[f]) {
                 fmt::print(" [");
                 for (auto q : mesh.mesh.labels[v].all())
-                    fmt::print("{}:{:.3f}/{:.3f} ", q, dbg_solid->of(q, tm.positions[v]).value_m, dbg_solid->of(q, p).value_m);
+                    fmt::print("{}:{:.3f}/{:.3f} ", q, dbg_solid->of(q, tm.positions[v]).value_m,
+                               dbg_solid->of(q, p).value_m);
                 fmt::print("]");
             }
             fmt::print("\n");
@@ -164,36 +167,38 @@ int main(int argc, char** argv) {
                                          {.spacing_m = 1, .balance = balance});
             ours = simplifier.within(bound);
             ours_s = processor_s() - start;
-            row = print_row(scene, fmt::format("{}, bound {}", balance ? "balanced" : "on it", bound),
-                            plain(ours.mesh), 1.001 * bound);
+            row =
+                print_row(scene, fmt::format("{}, bound {}", balance ? "balanced" : "on it", bound),
+                          plain(ours.mesh), 1.001 * bound);
             double radius = 0, error = 0;
             for (const UnresolvedPlace& p : ours.unresolved) {
                 radius = std::max(radius, p.radius_m);
                 error = std::max(error, p.error_m);
             }
-            fmt::print("    {:.2f} s, certified {:.4f}, {} places named (radius up to {:.2f}, error "
-                       "up to {:.3f}), {} of {} samples over the bound not named, {} crossings\n",
-                       ours_s, ours.error_m, ours.unresolved.size(), radius, error,
-                       n_unnamed(row, ours), row.errors.places.size(), ours.n_crossings);
+            fmt::print(
+                "    {:.2f} s, certified {:.4f}, {} places named (radius up to {:.2f}, error "
+                "up to {:.3f}), {} of {} samples over the bound not named, {} crossings\n",
+                ours_s, ours.error_m, ours.unresolved.size(), radius, error, n_unnamed(row, ours),
+                row.errors.places.size(), ours.n_crossings);
         }
     const std::size_t n = ours.mesh.triangles.size();
-    fmt::print("\nbound 0.25, balanced:\n  triangles {}\n  to the surface p99.9 {}\n  faces p99.9 {}\n"
-               "  rims p99 {}\n  crossings {}\n  samples over the bound, not named {}\n",
-               bars.at_most(double(n), 55000, 0), bars.at_most(row.errors.mesh.quantile(.999), .25),
-               bars.at_most(row.errors.face.quantile(.999), .25),
-               bars.at_most(row.errors.rim.quantile(.99), .2),
-               bars.at_most(double(row.certificate.n_self_intersections), 0, 0),
-               bars.at_most(double(n_unnamed(row, ours)), 0, 0));
+    fmt::print(
+        "\nbound 0.25, balanced:\n  triangles {}\n  to the surface p99.9 {}\n  faces p99.9 {}\n"
+        "  rims p99 {}\n  crossings {}\n  samples over the bound, not named {}\n",
+        bars.at_most(double(n), 55000, 0), bars.at_most(row.errors.mesh.quantile(.999), .25),
+        bars.at_most(row.errors.face.quantile(.999), .25),
+        bars.at_most(row.errors.rim.quantile(.99), .2),
+        bars.at_most(double(row.certificate.n_self_intersections), 0, 0),
+        bars.at_most(double(n_unnamed(row, ours)), 0, 0));
     if (peers) {
         double theirs_s = 0;
         const TriMesh theirs = by_openmesh(scene.dense, n, theirs_s);
         const Row their_row = print_row(scene, "OpenMesh ModQuadric", theirs, kBound);
-        fmt::print("\nbeside OpenMesh to the same count: {:.2f} s and {:.2f} s\n  faster {}\n"
-                   "  p99.9 of ours over its {}\n",
-                   ours_s, theirs_s, bars.at_least(theirs_s / ours_s, 15, 1),
-                   bars.at_most(row.errors.mesh.quantile(.999) /
-                                    their_row.errors.mesh.quantile(.999),
-                                1));
+        fmt::print(
+            "\nbeside OpenMesh to the same count: {:.2f} s and {:.2f} s\n  faster {}\n"
+            "  p99.9 of ours over its {}\n",
+            ours_s, theirs_s, bars.at_least(theirs_s / ours_s, 15, 1),
+            bars.at_most(row.errors.mesh.quantile(.999) / their_row.errors.mesh.quantile(.999), 1));
     }
 #ifdef TAIHU_HAS_MESHOPTIMIZER
     if (peers) {
@@ -201,14 +206,14 @@ int main(int argc, char** argv) {
         const TriMesh theirs = by_meshoptimizer(scene.dense, n, theirs_s);
         const Certificate before = certify(plain(scene.dense), {.self_intersections = false});
         const Row their_row = print_row(scene, "meshoptimizer", theirs, kBound);
-        fmt::print("\nbeside meshoptimizer to the same count: {:.2f} s and {:.2f} s\n  pieces that "
-                   "we lost {}, it {}\n  non-manifold edges of ours {}, of it {}\n",
-                   ours_s, theirs_s,
-                   bars.at_most(double(before.n_components) - double(row.certificate.n_components),
-                                0, 0),
-                   before.n_components - their_row.certificate.n_components,
-                   bars.at_most(double(row.certificate.n_nonmanifold_edges), 0, 0),
-                   their_row.certificate.n_nonmanifold_edges);
+        fmt::print(
+            "\nbeside meshoptimizer to the same count: {:.2f} s and {:.2f} s\n  pieces that "
+            "we lost {}, it {}\n  non-manifold edges of ours {}, of it {}\n",
+            ours_s, theirs_s,
+            bars.at_most(double(before.n_components) - double(row.certificate.n_components), 0, 0),
+            before.n_components - their_row.certificate.n_components,
+            bars.at_most(double(row.certificate.n_nonmanifold_edges), 0, 0),
+            their_row.certificate.n_nonmanifold_edges);
     }
 #endif
     if (more_holes) {

@@ -53,9 +53,8 @@ TEST(CornerTable, RefusesWhatIsNotAClosedManifold) {
     TriMesh out_of_range = cube();
     out_of_range.triangles[0][0] = 99;
     for (const TriMesh& mesh : {open, turned, touching, out_of_range, TriMesh{}})
-        expect_error(Fault::bad_argument, kNotClosed, [&] {
-            CornerTable(mesh.positions.size(), mesh.triangles, "here");
-        });
+        expect_error(Fault::bad_argument, kNotClosed,
+                     [&] { CornerTable(mesh.positions.size(), mesh.triangles, "here"); });
 }
 
 TEST(CornerTable, SplitsKeepTheSurfaceClosed) {

@@ -24,8 +24,8 @@ double sampled(const HoledBall& solid, const FaceErrors::Corners& f) {
     constexpr int n = 60;
     for (int u = 0; u <= n; ++u)
         for (int v = 0; u + v <= n; ++v) {
-            const Vec3 p = f[0] * (double(u) / n) + f[1] * (double(v) / n) +
-                           f[2] * (double(n - u - v) / n);
+            const Vec3 p =
+                f[0] * (double(u) / n) + f[1] * (double(v) / n) + f[2] * (double(n - u - v) / n);
             if (const auto y = surface_point_near(solid, p, 10))
                 most = std::max(most, length(*y - p));
         }
@@ -63,7 +63,8 @@ TEST(FaceErrors, AreNeverBelowTheDistanceOfAnyPoint) {
         FaceErrors::Corners face;
         FaceErrors::Labels labels{};
         for (std::size_t k = 0; k < 3; ++k) {
-            face[k] = dense.positions[t[k]] + 0.4 * random_vec(f, static_cast<std::uint32_t>(3 * k));
+            face[k] =
+                dense.positions[t[k]] + 0.4 * random_vec(f, static_cast<std::uint32_t>(3 * k));
             labels[k] = errors.labels()[t[k]];
         }
         // Larger than those of the mesh, about their first corner.

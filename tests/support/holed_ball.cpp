@@ -17,6 +17,18 @@ namespace {
 constexpr double kBlock = 8, kMargin = 5, kHalfDiagonal = 6.93;
 constexpr double kFar = 5;
 
+/// sin(2 pi turns) by its series, to 6e-8: the library's would be most of what simplification
+/// costs.
+double sine(double turns) {
+    constexpr double kRound = 0x1.8p52;
+    const double t = turns - ((turns + kRound) - kRound);
+    const double x = 2 * std::numbers::pi * std::copysign(.25 - std::abs(.25 - std::abs(t)), t);
+    const double y = x * x;
+    return x *
+           (1 + y * (-1. / 6 +
+                     y * (1. / 120 + y * (-1. / 5040 + y * (1. / 362880 + y * (-1. / 39916800))))));
+}
+
 } // namespace
 
 HoledBall::HoledBall(double radius, std::vector<Sphere> holes, bool rough)
@@ -27,9 +39,10 @@ HoledBall::HoledBall(double radius, std::vector<Sphere> holes, bool rough)
         const Rng rng{7, 1};
         for (std::size_t i = 0; i < kWave.size(); ++i) {
             const double c = 2 * rng.uniform(i, 0) - 1, s = std::sqrt(1 - c * c),
-                         t = 2 * std::numbers::pi * rng.uniform(i, 1), k = kWave[i] / radius;
-            waves_.push_back({Vec3{s * std::cos(t), s * std::sin(t), c} * k,
-                              2 * std::numbers::pi * rng.uniform(i, 2), kAmplitude[i] * radius});
+                         t = 2 * std::numbers::pi * rng.uniform(i, 1),
+                         k = kWave[i] / radius / (2 * std::numbers::pi);
+            waves_.push_back({Vec3{s * std::cos(t), s * std::sin(t), c} * k, rng.uniform(i, 2),
+                              kAmplitude[i] * radius});
         }
     }
     n_ = 2 * static_cast<int>(std::ceil(half_ / kBlock));
@@ -68,16 +81,19 @@ HoledBall::HoledBall(double radius, std::vector<Sphere> holes, bool rough)
                 }
     };
     for (const Sphere& s : holes_)
-        visit(s, [](std::size_t) {}, [&](std::size_t b) { states_[b] = State::air; });
+        visit(
+            s, [](std::size_t) {}, [&](std::size_t b) { states_[b] = State::air; });
     first_.assign(n_blocks + 1, 0);
     for (const Sphere& s : holes_)
-        visit(s, [&](std::size_t b) { ++first_[b + 1]; }, [](std::size_t) {});
+        visit(
+            s, [&](std::size_t b) { ++first_[b + 1]; }, [](std::size_t) {});
     for (std::size_t b = 0; b < n_blocks; ++b)
         first_[b + 1] += first_[b];
     entries_.resize(first_.back());
     auto at = first_;
     for (std::uint32_t h = 0; h < holes_.size(); ++h)
-        visit(holes_[h], [&](std::size_t b) { entries_[at[b]++] = h; }, [](std::size_t) {});
+        visit(
+            holes_[h], [&](std::size_t b) { entries_[at[b]++] = h; }, [](std::size_t) {});
 }
 
 HoledBall HoledBall::random(double dim, std::size_t n_holes, double porosity, std::uint64_t seed) {
@@ -99,9 +115,9 @@ FieldProbe::Value HoledBall::base(const Vec3& p) const {
     double rise = 0;
     Vec3 g = p / l;
     for (const Wave& w : waves_) {
-        const double a = dot(w.k, p) + w.phase;
-        rise += w.amplitude * std::sin(a);
-        g -= w.k * (w.amplitude * std::cos(a));
+        const double turns = dot(w.k, p) + w.phase;
+        rise += w.amplitude * sine(turns);
+        g -= w.k * (2 * std::numbers::pi * w.amplitude * sine(turns + .25));
     }
     const double slope = length(g);
     return {(l - radius_ - rise) / slope, g / slope};
@@ -212,8 +228,8 @@ bool Extraction::crossing(const Quad& q, Vec3& p, Primitive& which) const {
         return false;
     double t0 = 0, t1 = 1;
     for (int i = 0; i < 30; ++i) {
-        const double t = i % 3 == 2 ? (t0 + t1) / 2
-                                    : t0 + (t1 - t0) * std::clamp(f0 / (f0 - f1), .02, .98);
+        const double t =
+            i % 3 == 2 ? (t0 + t1) / 2 : t0 + (t1 - t0) * std::clamp(f0 / (f0 - f1), .02, .98);
         p = p0 + (p1 - p0) * t;
         const auto n = solid.at(p);
         which = n.primitive;
@@ -319,8 +335,8 @@ void Extraction::retreat() {
     for (int it = 0; it < 12; ++it) {
         auto pairs = crossing_pairs(v, faces, picked);
         for (std::uint32_t f = 0; f < faces.size(); ++f)
-            if (picked[f] && length(taihu::cross(v[faces[f][1]] - v[faces[f][0]], v[faces[f][2]] - v[faces[f][0]])) <
-                                 1e-4 * h * h)
+            if (picked[f] && length(taihu::cross(v[faces[f][1]] - v[faces[f][0]],
+                                                 v[faces[f][2]] - v[faces[f][0]])) < 1e-4 * h * h)
                 pairs.push_back({f, f});
         if (pairs.empty())
             return;
@@ -366,7 +382,8 @@ openvdb::FloatGrid::Ptr level_set_of(const HoledBall& solid, double h) {
         bool any = false;
         for (openvdb::Index v = 0; v < 512; ++v) {
             const Coord c = leaf->offsetToGlobalCoord(v);
-            const double d = solid.at(Vec3{double(c.x()), double(c.y()), double(c.z())} * h).value_m;
+            const double d =
+                solid.at(Vec3{double(c.x()), double(c.y()), double(c.z())} * h).value_m;
             const bool band = std::abs(d) < 3 * h;
             any |= band;
             leaf->setValueOnly(v, static_cast<float>(std::clamp(d, -3 * h, 3 * h)));
@@ -386,7 +403,8 @@ LabelledMesh sharp_surface(const HoledBall& solid, double spacing) {
     Extraction e{solid, spacing, {}, {}, {}, {}, {}, {}};
     std::vector<openvdb::Vec3I> triangles;
     std::vector<openvdb::Vec4I> quads;
-    openvdb::tools::volumeToMesh(*level_set_of(solid, spacing), e.points, triangles, quads, 0.0, 0.0);
+    openvdb::tools::volumeToMesh(*level_set_of(solid, spacing), e.points, triangles, quads, 0.0,
+                                 0.0);
     for (const auto& q : quads)
         e.quads.push_back({q[0], q[1], q[2], q[3]});
     for (const auto& p : e.points)

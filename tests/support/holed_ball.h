@@ -29,8 +29,9 @@ public:
 
 private:
     struct Wave {
-        Vec3 k;
-        double phase, amplitude;
+        Vec3 k;       ///< [turns / m]
+        double phase; ///< [turns]
+        double amplitude;
     };
     enum class State : std::uint8_t { air, solid, near_base };
 

@@ -123,8 +123,8 @@ SurfaceErrors surface_errors(const FieldProbe& field, const SurfacePoints& point
     std::vector<Chunk> chunks((mesh.triangles.size() + kChunk - 1) / kChunk);
     tbb::parallel_for(std::size_t{0}, chunks.size(), [&](std::size_t i) {
         Chunk& out = chunks[i];
-        for (std::size_t f = i * kChunk;
-             f < std::min((i + 1) * kChunk, mesh.triangles.size()); ++f) {
+        for (std::size_t f = i * kChunk; f < std::min((i + 1) * kChunk, mesh.triangles.size());
+             ++f) {
             const Triangle t = mesh.triangles[f];
             const Vec3 &a = mesh.positions[t[0]], &b = mesh.positions[t[1]],
                        &c = mesh.positions[t[2]];
@@ -153,18 +153,17 @@ SurfaceErrors surface_errors(const FieldProbe& field, const SurfacePoints& point
     SurfaceErrors errors;
     for (const Chunk& c : chunks) {
         errors.mesh.values.insert(errors.mesh.values.end(), c.errors.begin(), c.errors.end());
-        errors.turn_deg.values.insert(errors.turn_deg.values.end(), c.turns.begin(),
-                                      c.turns.end());
+        errors.turn_deg.values.insert(errors.turn_deg.values.end(), c.turns.begin(), c.turns.end());
         errors.places.insert(errors.places.end(), c.places.begin(), c.places.end());
     }
     const SurfaceDistance distance(mesh);
     const auto measure = [&](const std::vector<Vec3>& from, ErrorSample& to) {
         to.values.resize(from.size());
-        tbb::parallel_for(
-            tbb::blocked_range<std::size_t>(0, from.size(), 1024), [&](const auto& r) {
-                for (std::size_t i = r.begin(); i < r.end(); ++i)
-                    to.values[i] = static_cast<float>(distance(from[i]));
-            });
+        tbb::parallel_for(tbb::blocked_range<std::size_t>(0, from.size(), 1024),
+                          [&](const auto& r) {
+                              for (std::size_t i = r.begin(); i < r.end(); ++i)
+                                  to.values[i] = static_cast<float>(distance(from[i]));
+                          });
     };
     measure(points.face, errors.face);
     measure(points.rim, errors.rim);

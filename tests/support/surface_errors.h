@@ -30,7 +30,7 @@ struct ErrorSample {
 /// lattice on every face, to the surface by projection (never |field| alone).
 struct SurfaceErrors {
     ErrorSample mesh, face, rim, corner, thin;
-    ErrorSample turn_deg; ///< between the face's normal and the field's at its middle
+    ErrorSample turn_deg;     ///< between the face's normal and the field's at its middle
     std::vector<Vec3> places; ///< points of the mesh beyond `bound`
 };
 SurfaceErrors surface_errors(const FieldProbe& field, const SurfacePoints& points,
