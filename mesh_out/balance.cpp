@@ -40,7 +40,7 @@ FaceState state_of(const BoundedSurface& s, std::size_t face) {
 Vec3 moved(const BoundedSurface& s, std::uint32_t v, const std::vector<FaceState>& faces) {
     const Vec3& p = s.positions[v];
     const auto shapes = s.errors.shapes(s.labels[v]);
-    if (shapes.size() > 2)
+    if (shapes.size() > 2 || s.kept[v])
         return p;
     std::array<Vec3, 2> normal;
     std::array<double, 2> by{};

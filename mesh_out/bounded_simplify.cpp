@@ -15,18 +15,30 @@ namespace {
 
 constexpr const char* kWhere = "simplify";
 constexpr int kPasses = 3;
-constexpr double kBlockEdges = 32;     ///< edges along a block, as they are on average
+constexpr double kBlockEdges = 48;     ///< edges along a block, as they are on average
 constexpr double kShift = 3. / 7;      ///< of a block from pass to pass
 constexpr double kCentredShare = 0.75; ///< of the bound, for errors that balancing will centre
 constexpr double kCountTolerance = 0.02;
 constexpr int kMostTrials = 24;
-constexpr int kMostFreezes = 3;
-constexpr double kFreeze = 1; ///< spacings round a crossing, where the input stays; then twice that
+constexpr int kMostTries = 3; ///< to balance and mend one simplified surface without crossings
+constexpr int kMostFreezes = 2;
 constexpr double kFirstBound = 0.1; ///< of a spacing, where a search begins
 
 void require(bool holds, const std::string& message) {
     if (!holds)
         throw Error(Fault::bad_argument, std::string(kWhere) + ": " + message);
+}
+
+/// Which points lie in the balls, grown by `margin_m`.
+std::vector<std::uint8_t> near(const std::vector<Vec3>& points, const std::vector<Sphere>& balls,
+                               double margin_m) {
+    std::vector<std::uint8_t> out(points.size(), 0);
+    for (const Sphere& ball : balls) {
+        const double r = ball.radius_m + margin_m;
+        for (std::size_t i = 0; i < points.size(); ++i)
+            out[i] |= length_squared(points[i] - ball.center) <= r * r;
+    }
+    return out;
 }
 
 /// What the table still has, renumbered.
@@ -86,10 +98,15 @@ LabelledMesh BoundedSimplifier::collapse(double bound_m, std::span<const std::ui
 BoundedMesh BoundedSimplifier::level(double bound_m, LabelledMesh& collapsed,
                                      Progress* progress) const {
     std::vector<std::uint8_t> frozen(mesh_.positions.size(), 0);
+    std::vector<Sphere> crossings;
+    // Balancing and splitting may make faces cross: not there, then. If that does not help, the
+    // input stays round them; it does not cross itself.
     for (int trial = 0;; ++trial) {
-        report_stage(progress, "simplify");
-        collapsed = collapse(bound_m, frozen, progress);
-        report_stage(progress, "check the bound");
+        if (trial == 0 || trial > kMostTries) {
+            report_stage(progress, "simplify");
+            collapsed = collapse(bound_m, frozen, progress);
+            report_stage(progress, "check the bound");
+        }
         FaceErrors errors(collapsed, field_, bound_m, settings_.spacing_m);
         BoundedSurface surface{CornerTable(collapsed.positions.size(), collapsed.triangles, kWhere),
                                collapsed.positions,
@@ -97,19 +114,17 @@ BoundedMesh BoundedSimplifier::level(double bound_m, LabelledMesh& collapsed,
                                errors.labels(),
                                errors,
                                bound_m,
-                               settings_.spacing_m};
+                               settings_.spacing_m,
+                               near(collapsed.positions, crossings, settings_.spacing_m)};
         if (settings_.balance)
             balance(surface);
         Repaired repaired = repair(surface, progress);
-        if (repaired.crossings.empty() || trial == kMostFreezes)
+        if (repaired.crossings.empty() || trial == kMostTries + kMostFreezes)
             return std::move(repaired.result);
-        // The input does not cross itself: keep it round the faces that do.
-        const double margin = kFreeze * settings_.spacing_m * (1 << trial);
-        for (const Sphere& s : repaired.crossings)
-            for (std::size_t v = 0; v < frozen.size(); ++v)
-                if (length_squared(mesh_.positions[v] - s.center) <=
-                    (s.radius_m + margin) * (s.radius_m + margin))
-                    frozen[v] = 1;
+        crossings.insert(crossings.end(), repaired.crossings.begin(), repaired.crossings.end());
+        if (trial >= kMostTries)
+            frozen =
+                near(mesh_.positions, crossings, (1 << (trial - kMostTries)) * settings_.spacing_m);
     }
 }
 

@@ -16,6 +16,7 @@ struct BoundedSurface {
     std::vector<std::uint32_t> labels;
     FaceErrors& errors;
     double bound_m = 0, spacing_m = 0;
+    std::vector<std::uint8_t> kept; ///< per vertex of the start: not moved, its faces not split
 
     FaceErrors::Corners corners(std::size_t face) const {
         const Triangle t = table.triangle(face);

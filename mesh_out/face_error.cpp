@@ -16,6 +16,8 @@ constexpr double kTouch = 0.02; ///< of a spacing: deeper is in, for primitives 
 constexpr std::size_t kMostSteps = 12; ///< along an edge, of samples
 constexpr int kMostHalvings = 2;
 constexpr double kSmallest = 0.2;     ///< of a spacing: parts of faces are not divided further
+constexpr double kStep = 1.6;         ///< spacings from sample to sample
+constexpr double kFineStep = 0.5;     ///< where a primitive turns out to have creases
 constexpr double kSteep = 0.95;       ///< gradients of distances have length 1
 constexpr double kPlanarMargin = 1.1; ///< rims of other surfaces are bent; planes are not
 
@@ -154,7 +156,7 @@ FaceErrors::Range FaceErrors::range(std::uint32_t shape, const Corners& f,
                                     const CornerValues* known, double give_up_m) const {
     const Shape& s = shapes_[shape];
     if (!s.is_ball)
-        return sampled_range(s, f, known, give_up_m);
+        return sampled_range(s, f, known, give_up_m, kStep * spacing_);
     const double nearest =
         length(closest_point_on_triangle(s.center, f[0], f[1], f[2]) - s.center) - s.radius;
     const double farthest = radius_about(s.center, f) - s.radius;
@@ -163,10 +165,11 @@ FaceErrors::Range FaceErrors::range(std::uint32_t shape, const Corners& f,
 
 /// Where a primitive has creases of its own, or a blend, its values under-read and are not steep:
 /// then the way to where it is 0 counts.
-double FaceErrors::distance_to(Primitive primitive, const Vec3& p, Vec3& gradients) const {
+double FaceErrors::sample(Primitive primitive, const Vec3& p, Range& range) const {
     const FieldProbe::Value at = field_.of(primitive, p);
-    gradients += at.gradient;
     const double slope = length(at.gradient);
+    range.gradient += at.gradient;
+    range.least_slope = std::min(range.least_slope, slope);
     if (slope > kSteep)
         return at.value_m;
     if (const auto y = onto(field_, PrimitiveSet(primitive), p, 2 * pad_))
@@ -175,10 +178,10 @@ double FaceErrors::distance_to(Primitive primitive, const Vec3& p, Vec3& gradien
 }
 
 FaceErrors::Range FaceErrors::sampled_range(const Shape& shape, const Corners& f,
-                                            const CornerValues* known, double give_up_m) const {
-    const std::size_t n =
-        std::clamp(static_cast<std::size_t>(std::ceil(longest_edge(f) / (1.6 * spacing_))),
-                   std::size_t{2}, kMostSteps);
+                                            const CornerValues* known, double give_up_m,
+                                            double step) const {
+    const std::size_t n = std::clamp(static_cast<std::size_t>(std::ceil(longest_edge(f) / step)),
+                                     std::size_t{2}, kMostSteps);
     std::array<double, (kMostSteps + 1) * (kMostSteps + 1)> values;
     const auto at = [&](std::size_t u, std::size_t v) -> double& {
         return values[u * (kMostSteps + 1) + v];
@@ -187,21 +190,22 @@ FaceErrors::Range FaceErrors::sampled_range(const Shape& shape, const Corners& f
     for (std::size_t u = 0; u <= n; ++u)
         for (std::size_t v = 0; u + v <= n; ++v) {
             const bool corner = u == n || v == n || u + v == 0;
-            double d = 0;
-            if (corner && known) {
-                d = (*known)[u == n ? 1 : v == n ? 2 : 0];
-            } else {
-                const double x = static_cast<double>(u) / static_cast<double>(n),
-                             y = static_cast<double>(v) / static_cast<double>(n);
-                d = distance_to(shape.primitive, f[1] * x + f[2] * y + f[0] * (1 - x - y),
-                                r.gradient);
-            }
+            const double x = static_cast<double>(u) / static_cast<double>(n),
+                         y = static_cast<double>(v) / static_cast<double>(n);
+            const double d = corner && known ? (*known)[u == n   ? 1
+                                                        : v == n ? 2
+                                                                 : 0]
+                                             : sample(shape.primitive,
+                                                      f[1] * x + f[2] * y + f[0] * (1 - x - y), r);
             at(u, v) = d;
             r.lo = std::min(r.lo, d);
             r.hi = std::max(r.hi, d);
             if (r.most() > give_up_m)
                 return r;
         }
+    const double fine = kFineStep * spacing_;
+    if (r.least_slope < kSteep && step > fine)
+        return sampled_range(shape, f, known, give_up_m, fine);
     // Between three samples on a line a parabola passes the highest by at most 1/8 of the second
     // difference.
     double bend = 0;
@@ -214,7 +218,9 @@ FaceErrors::Range FaceErrors::sampled_range(const Shape& shape, const Corners& f
             if (u > 0 && v > 0)
                 bend = std::max(bend, std::abs(at(u - 1, v + 1) - 2 * at(u, v) + at(u + 1, v - 1)));
         }
-    return {r.lo - (r.lo < 0 ? bend / 8 : 0), r.hi + (r.hi > 0 ? bend / 8 : 0), r.gradient};
+    r.lo -= r.lo < 0 ? bend / 8 : 0;
+    r.hi += r.hi > 0 ? bend / 8 : 0;
+    return r;
 }
 
 double FaceErrors::against(std::uint32_t own, const Range& own_range, std::uint32_t other,
@@ -315,7 +321,7 @@ double FaceErrors::past_rim(const Meeting& pair, const Corners& face, double own
 double FaceErrors::searched(const Corners& face, double enough_m, double give_up_m) const {
     const auto y = surface_point_near(field_, middle(face), 4 * pad_);
     const double far = y ? radius_about(*y, face) : kInfinity;
-    if (far <= enough_m || longest_edge(face) < kSmallest * spacing_)
+    if (far <= enough_m || longest_edge(face) < kSmallest * enough_m)
         return far;
     double most = 0;
     for (const Corners& part : quarters(face)) {

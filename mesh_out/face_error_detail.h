@@ -37,7 +37,8 @@ public:
     /// The range of values of a primitive over a face [m].
     struct Range {
         double lo = 0, hi = 0;
-        Vec3 gradient; ///< summed over samples; 0 for balls
+        Vec3 gradient;          ///< summed over samples; 0 for balls
+        double least_slope = 1; ///< of the samples
         double most() const { return std::max(-lo, hi); }
     };
     /// What one face is judged by.
@@ -97,9 +98,9 @@ private:
     using CornerValues = std::array<double, 3>;
     Range range(std::uint32_t shape, const Corners& face, const CornerValues* known = nullptr,
                 double give_up_m = kFar) const;
-    double distance_to(Primitive primitive, const Vec3& p, Vec3& gradients) const;
+    double sample(Primitive primitive, const Vec3& p, Range& range) const;
     Range sampled_range(const Shape& shape, const Corners& face, const CornerValues* known,
-                        double give_up_m) const;
+                        double give_up_m, double step) const;
     double past_rim(const Meeting& meeting, const Corners& face, double own, double other) const;
     double meeting(const Meeting& meeting, const Corners& face, const Range& own,
                    const Range& other, int depth) const;

@@ -166,7 +166,7 @@ bool Repair::split_is_shapely(std::uint32_t corner, const Vec3& at) const {
 
 bool Repair::split(std::size_t face) {
     for (const std::uint32_t v : s_.table.triangle(face))
-        if (v >= n_old_ && retreated_[v - n_old_])
+        if (v < n_old_ ? s_.kept[v] : retreated_[v - n_old_])
             return false;
     const std::uint32_t first = longest(face);
     for (const std::uint32_t corner :

@@ -1,7 +1,6 @@
 // Simplification under a bound, beside OpenMesh's quadric decimater on the same sharp surface and
 // OpenVDB's adaptive mesher on the same grid. Errors are measured against the exact field, in
 // voxels.
-#include <cstdlib>
 #include <string>
 #include <vector>
 
@@ -20,7 +19,6 @@
 #include "mesh_out/bounded_simplify.h"
 #include "mesh_out/certificate.h"
 #include "mesh_out/half_edges_detail.h"
-#include "mesh_out/surface_distance.h"
 #include "tests/bench/bars.h"
 #include "tests/bench/ratio.h"
 #include "tests/support/holed_ball.h"
@@ -47,7 +45,6 @@ struct Scene {
           points(surface_points(solid, plain(dense), 1, 300000)) {}
 };
 
-const HoledBall* dbg_solid = nullptr;
 struct Row {
     SurfaceErrors errors;
     Certificate certificate;
@@ -113,28 +110,6 @@ TriMesh by_meshoptimizer(const LabelledMesh& dense, std::size_t n, double& secon
 /// Samples over the bound that no place names.
 std::size_t n_unnamed(const Row& row, const BoundedMesh& mesh) {
     std::size_t n = 0;
-    if (std::getenv("DBG")) {
-        auto tm = plain(mesh.mesh);
-        SurfaceDistance sd(tm);
-        for (const Vec3& p : row.errors.places) {
-            bool named = false;
-            for (const UnresolvedPlace& place : mesh.unresolved)
-                named = named || length(p - place.center) <= place.radius_m + 1e-9;
-            if (named)
-                continue;
-            auto f = sd.nearest_triangle(p);
-            fmt::print("  at {:.3f} {:.3f} {:.3f}: {:.3f} by {}; face {}:", p.x, p.y, p.z,
-                       dbg_solid->at(p).value_m, dbg_solid->at(p).primitive, f);
-            for (auto v : tm.triangles[f]) {
-                fmt::print(" [");
-                for (auto q : mesh.mesh.labels[v].all())
-                    fmt::print("{}:{:.3f}/{:.3f} ", q, dbg_solid->of(q, tm.positions[v]).value_m,
-                               dbg_solid->of(q, p).value_m);
-                fmt::print("]");
-            }
-            fmt::print("\n");
-        }
-    }
     for (const Vec3& p : row.errors.places) {
         bool named = false;
         for (const UnresolvedPlace& place : mesh.unresolved)
@@ -152,7 +127,6 @@ int main(int argc, char** argv) {
     const bool more_holes = argc < 2;
     Bars bars;
     const Scene scene(1000);
-    dbg_solid = &scene.solid;
     fmt::print("{:<26} {:>8} | to the surface: max p99.9 rms | faces: max p99.9 | rims: max p99.9 "
                "p99 | normals p99 | crossings, non-manifold edges, pieces, Euler number\n",
                "1000 holes, 256 voxels", "faces");
