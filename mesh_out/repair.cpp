@@ -11,16 +11,39 @@
 
 namespace taihu {
 
-double BoundedSurface::error_of(std::size_t face) const {
+namespace {
+
+constexpr int kMostQuarterings = 3; ///< before surface points are searched for
+
+/// Most of a face that the closed forms do not certify lies far from what they stumble over.
+double certified(const BoundedSurface& s, const FaceErrors::Corners& part,
+                 const FaceErrors::Labels& labels, int depth) {
     const FaceErrors::Rules rules{
-        .face_m = bound_m, .rim_m = bound_m, .exact_corners = false, .may_pierce = true};
-    const double known = errors.bound(corners(face), labels_of(face), rules);
-    return known <= bound_m ? known : errors.searched(corners(face), bound_m, bound_m);
+        .face_m = s.bound_m, .rim_m = s.bound_m, .exact_corners = false, .may_pierce = true};
+    const double known = s.errors.bound(part, labels, rules);
+    if (known <= s.bound_m)
+        return known;
+    FaceErrors::Range range;
+    if (depth == kMostQuarterings || s.errors.own(part, labels, false, range) == FaceErrors::kNone)
+        return s.errors.searched(part, s.bound_m, s.bound_m);
+    double most = 0;
+    for (const FaceErrors::Corners& quarter : FaceErrors::quarters(part)) {
+        most = std::max(most, certified(s, quarter, labels, depth + 1));
+        if (most > s.bound_m)
+            break;
+    }
+    return most;
+}
+
+} // namespace
+
+double BoundedSurface::error_of(std::size_t face) const {
+    return certified(*this, corners(face), labels_of(face), 0);
 }
 
 namespace {
 
-constexpr int kRounds = 8;
+constexpr int kRounds = 5;
 constexpr double kShortest = 0.4;  ///< of a spacing: what is split no more
 constexpr double kLeastTurn = 0.2; ///< cosine of how far a split may turn a face
 
@@ -247,7 +270,7 @@ std::vector<UnresolvedPlace> Repair::places(const std::vector<std::uint8_t>& bad
         while (!open.empty()) {
             const std::size_t f = open.back();
             open.pop_back();
-            error = std::max(error, s_.errors.searched(s_.corners(f), s_.bound_m));
+            error = std::max(error, s_.errors.searched(s_.corners(f), 1.5 * s_.bound_m));
             for (const std::uint32_t v : s_.table.triangle(f)) {
                 box.include(s_.positions[v]);
                 std::uint32_t c = s_.table.corner(v);
