@@ -35,6 +35,11 @@ double longest_edge(const FaceErrors::Corners& f) {
         {length_squared(f[0] - f[1]), length_squared(f[1] - f[2]), length_squared(f[2] - f[0])}));
 }
 
+std::array<FaceErrors::Corners, 4> quarters(const FaceErrors::Corners& f) {
+    const Vec3 ab = (f[0] + f[1]) * .5, bc = (f[1] + f[2]) * .5, ca = (f[2] + f[0]) * .5;
+    return {{{f[0], ab, ca}, {ab, f[1], bc}, {ca, bc, f[2]}, {ab, bc, ca}}};
+}
+
 /// How far from the edge of a wedge a point is whose distances past its two planes are at most `d`
 /// and `e`, where neither plane is nearest; `cosine` that of the angle between their normals.
 double past_wedge(double d, double e, double cosine) {
@@ -49,11 +54,6 @@ double past_wedge(double d, double e, double cosine) {
 }
 
 } // namespace
-
-std::array<FaceErrors::Corners, 4> FaceErrors::quarters(const Corners& f) {
-    const Vec3 ab = (f[0] + f[1]) * .5, bc = (f[1] + f[2]) * .5, ca = (f[2] + f[0]) * .5;
-    return {{{f[0], ab, ca}, {ab, f[1], bc}, {ca, bc, f[2]}, {ab, bc, ca}}};
-}
 
 double FaceErrors::bound(const Corners& face, const Labels& labels, const Rules& rules) const {
     Range range;

@@ -72,8 +72,6 @@ public:
     /// beyond `give_up_m` the search ends.
     double searched(const Corners& face, double enough_m, double give_up_m = kFar) const;
 
-    static std::array<Corners, 4> quarters(const Corners& face);
-
     static constexpr std::uint32_t kNone = 0xffffffffu;
     static constexpr double kFar = 1e300;
     bool has_closed_form(std::uint32_t shape) const { return shapes_[shape].is_ball; }

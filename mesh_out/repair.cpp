@@ -11,34 +11,11 @@
 
 namespace taihu {
 
-namespace {
-
-constexpr int kMostQuarterings = 3; ///< before surface points are searched for
-
-/// Most of a face that the closed forms do not certify lies far from what they stumble over.
-double certified(const BoundedSurface& s, const FaceErrors::Corners& part,
-                 const FaceErrors::Labels& labels, int depth) {
-    const FaceErrors::Rules rules{
-        .face_m = s.bound_m, .rim_m = s.bound_m, .exact_corners = false, .may_pierce = true};
-    const double known = s.errors.bound(part, labels, rules);
-    if (known <= s.bound_m)
-        return known;
-    FaceErrors::Range range;
-    if (depth == kMostQuarterings || s.errors.own(part, labels, false, range) == FaceErrors::kNone)
-        return s.errors.searched(part, s.bound_m, s.bound_m);
-    double most = 0;
-    for (const FaceErrors::Corners& quarter : FaceErrors::quarters(part)) {
-        most = std::max(most, certified(s, quarter, labels, depth + 1));
-        if (most > s.bound_m)
-            break;
-    }
-    return most;
-}
-
-} // namespace
-
 double BoundedSurface::error_of(std::size_t face) const {
-    return certified(*this, corners(face), labels_of(face), 0);
+    const FaceErrors::Rules rules{
+        .face_m = bound_m, .rim_m = bound_m, .exact_corners = false, .may_pierce = true};
+    const double known = errors.bound(corners(face), labels_of(face), rules);
+    return known <= bound_m ? known : errors.searched(corners(face), bound_m, bound_m);
 }
 
 namespace {
