@@ -23,7 +23,6 @@ public:
 
     /// The number of the label set of each vertex of the mesh.
     const std::vector<std::uint32_t>& labels() const { return labels_; }
-    std::size_t n_labels() const { return sets_.size(); }
     std::size_t n_primitives(std::uint32_t label) const { return sets_[label].size(); }
     bool within(std::uint32_t a, std::uint32_t b) const {
         return a == b || sets_[a].within(sets_[b]);
