@@ -219,14 +219,14 @@ public:
     struct Face {
         Box box;
         Triangle vertices{};
-        std::uint32_t number = 0;
+        std::uint32_t index = 0; ///< in the order that they were given in
     };
 
     BoxTree(std::span<const Vec3> positions, std::span<const Triangle> faces)
         : faces_(faces.size()) {
         tbb::parallel_for(std::size_t{0}, faces.size(), [&](std::size_t i) {
             faces_[i].vertices = faces[i];
-            faces_[i].number = static_cast<std::uint32_t>(i);
+            faces_[i].index = static_cast<std::uint32_t>(i);
             for (const std::uint32_t v : faces[i])
                 faces_[i].box.include(positions[v]);
         });
@@ -382,25 +382,27 @@ std::size_t count_crossings(std::span<const Vec3> positions, std::span<const Tri
         [](std::size_t a, std::size_t b) { return a + b; });
 }
 
-std::vector<std::array<std::uint32_t, 2>> find_crossings(std::span<const Vec3> positions,
-                                                         std::span<const Triangle> faces,
-                                                         std::span<const char> picked) {
+std::vector<std::pair<std::uint32_t, std::uint32_t>>
+crossing_pairs(std::span<const Vec3> positions, std::span<const Triangle> faces,
+               std::span<const std::uint8_t> picked) {
+    using Pairs = std::vector<std::pair<std::uint32_t, std::uint32_t>>;
+    const auto is_picked = [&](std::size_t i) { return picked.empty() || picked[i] != 0; };
     std::vector<Triangle> some;
     std::vector<std::uint32_t> number;
     const auto has_area = [&](std::size_t i) {
         return !is_flat(positions[faces[i][0]], positions[faces[i][1]], positions[faces[i][2]]);
     };
     for (std::size_t i = 0; i < faces.size(); ++i)
-        if (picked[i] && has_area(i)) {
+        if (is_picked(i) && has_area(i)) {
             some.push_back(faces[i]);
             number.push_back(static_cast<std::uint32_t>(i));
         }
-    std::vector<std::array<std::uint32_t, 2>> pairs;
+    Pairs pairs;
     if (some.empty())
         return pairs;
     const BoxTree tree(positions, some);
     constexpr std::size_t kChunk = 4096;
-    std::vector<std::vector<std::array<std::uint32_t, 2>>> found(faces.size() / kChunk + 1);
+    std::vector<Pairs> found(faces.size() / kChunk + 1);
     tbb::parallel_for(std::size_t{0}, found.size(), [&](std::size_t chunk) {
         const std::size_t end = std::min(faces.size(), (chunk + 1) * kChunk);
         for (std::size_t i = chunk * kChunk; i < end; ++i) {
@@ -409,13 +411,13 @@ std::vector<std::array<std::uint32_t, 2>> find_crossings(std::span<const Vec3> p
                 box.include(positions[v]);
             tree.visit_from(0, box, [&](std::size_t k) {
                 const BoxTree::Face& other = tree.faces()[k];
-                const std::uint32_t n = number[other.number];
+                const std::uint32_t n = number[other.index];
                 const auto own = static_cast<std::uint32_t>(i);
-                if (n == own || (picked[i] && n < own) || !BoxTree::overlap(box, other.box) ||
+                if (n == own || (is_picked(i) && n < own) || !BoxTree::overlap(box, other.box) ||
                     !has_area(i))
                     return;
                 if (faces_cross(positions, faces[i], other.vertices))
-                    found[chunk].push_back({std::min(own, n), std::max(own, n)});
+                    found[chunk].push_back(std::minmax(own, n));
             });
         }
     });

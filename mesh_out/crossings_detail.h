@@ -3,6 +3,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <span>
+#include <utility>
 #include <vector>
 
 #include "stats/core/tri_mesh.h"
@@ -29,11 +30,11 @@ bool faces_cross(std::span<const Vec3> positions, Triangle f, Triangle g);
 /// Time O(n log n + pairs whose boxes overlap), memory about 100 bytes per face.
 std::size_t count_crossings(std::span<const Vec3> positions, std::span<const Triangle> faces);
 
-/// The pairs of which a face is `picked` (one flag per face), each once, the lower number first,
-/// sorted. Time and memory as for the picked faces alone, and a look-up for each of the others.
-/// Faces without area are left out.
-std::vector<std::array<std::uint32_t, 2>> find_crossings(std::span<const Vec3> positions,
-                                                         std::span<const Triangle> faces,
-                                                         std::span<const char> picked);
+/// The pairs themselves, lower index first, ascending; faces without area are left out. Time and
+/// memory as for the picked faces alone, and a look-up for each of the others. \param picked  one
+/// flag per face, or empty for all: pairs with at least one picked face.
+std::vector<std::pair<std::uint32_t, std::uint32_t>>
+crossing_pairs(std::span<const Vec3> positions, std::span<const Triangle> faces,
+               std::span<const std::uint8_t> picked = {});
 
 } // namespace taihu

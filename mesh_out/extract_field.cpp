@@ -91,7 +91,7 @@ public:
     /// that cannot be helped so are returned.
     std::vector<std::uint32_t> retreat() {
         constexpr int kMostRounds = 16;
-        std::vector<char> picked(mesh_.triangles.size(), 1);
+        std::vector<std::uint8_t> picked(mesh_.triangles.size(), 1);
         std::vector<std::uint32_t> hit;
         for (int round = 0; round < kMostRounds; ++round) {
             std::vector<std::uint32_t> polygons; // that change
@@ -122,7 +122,7 @@ public:
 private:
     static constexpr std::uint8_t kLastStage = 3;
 
-    void pick(const std::vector<std::uint32_t>& polygons, std::vector<char>& picked) const {
+    void pick(const std::vector<std::uint32_t>& polygons, std::vector<std::uint8_t>& picked) const {
         for (const std::uint32_t p : polygons)
             for (auto t = first_triangle_[p]; t < first_triangle_[p + 1]; ++t)
                 picked[t] = 1;
@@ -273,7 +273,7 @@ private:
 
     /// The vertices to move of triangles that cross, have no area, or two vertices in one place.
     /// \param turned  polygons that were split along their other diagonal instead.
-    std::vector<std::uint32_t> in_trouble(const std::vector<char>& picked,
+    std::vector<std::uint32_t> in_trouble(const std::vector<std::uint8_t>& picked,
                                           std::vector<std::uint32_t>& turned) {
         std::vector<std::uint32_t> hit;
         std::vector<char> needle(mesh_.triangles.size());
@@ -282,9 +282,10 @@ private:
         for (std::size_t t = 0; t < needle.size(); ++t)
             if (needle[t])
                 add_movable({&mesh_.triangles[t], 1}, hit);
-        for (const auto& pair : find_crossings(mesh_.positions, mesh_.triangles, picked))
-            if (!untangle(pair, turned))
-                add_movable(std::array{mesh_.triangles[pair[0]], mesh_.triangles[pair[1]]}, hit);
+        for (const auto& pair : crossing_pairs(mesh_.positions, mesh_.triangles, picked))
+            if (!untangle({pair.first, pair.second}, turned))
+                add_movable(std::array{mesh_.triangles[pair.first], mesh_.triangles[pair.second]},
+                            hit);
         if (hit.empty() && turned.empty())
             hit = in_one_place();
         std::sort(hit.begin(), hit.end());

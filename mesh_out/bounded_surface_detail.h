@@ -1,0 +1,45 @@
+#pragma once
+#include <cstdint>
+#include <vector>
+
+#include "mesh_out/bounded_simplify.h"
+#include "mesh_out/corner_table_detail.h"
+#include "mesh_out/face_error_detail.h"
+
+namespace taihu {
+
+/// A simplified surface while it is balanced, checked and repaired.
+struct BoundedSurface {
+    CornerTable table;
+    std::vector<Vec3> exact;     ///< where each vertex lies on the solid's surface
+    std::vector<Vec3> positions; ///< where it was moved to
+    std::vector<std::uint32_t> labels;
+    FaceErrors& errors;
+    double bound_m = 0, spacing_m = 0;
+    std::vector<std::uint8_t> kept; ///< per vertex of the start: not moved, its faces not split
+
+    FaceErrors::Corners corners(std::size_t face) const {
+        const Triangle t = table.triangle(face);
+        return {positions[t[0]], positions[t[1]], positions[t[2]]};
+    }
+    FaceErrors::Labels labels_of(std::size_t face) const {
+        const Triangle t = table.triangle(face);
+        return {labels[t[0]], labels[t[1]], labels[t[2]]};
+    }
+    /// An upper bound of the distance of a face, infinite or above the bound when it is not held.
+    double error_of(std::size_t face) const;
+};
+
+/// Moves vertices along the normals of their primitives so that the values over the faces round
+/// them are centred on 0, and back where that would break the bound.
+void balance(BoundedSurface& surface);
+
+/// Makes the bound hold and crossings vanish: moved vertices go back, faces are split by new
+/// vertices on the solid's surface. What neither mends is named.
+struct Repaired {
+    BoundedMesh result;
+    std::vector<Sphere> crossings; ///< round faces that still meet others
+};
+Repaired repair(BoundedSurface& surface, Progress* progress);
+
+} // namespace taihu

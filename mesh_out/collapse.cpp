@@ -1,0 +1,309 @@
+#include <algorithm>
+#include <atomic>
+#include <bit>
+#include <cmath>
+
+#include <tbb/blocked_range.h>
+#include <tbb/enumerable_thread_specific.h>
+#include <tbb/parallel_for.h>
+
+#include "mesh_out/collapse_detail.h"
+#include "stats/core/box.h"
+
+namespace taihu {
+namespace {
+
+constexpr std::uint32_t kNone = CornerTable::kNone;
+constexpr std::size_t kMostValence = 24;
+constexpr float kLengthWeight = 1e-3f; ///< on what is flat, short edges go first
+constexpr float kAtOnce = 1e-20f, kNever = 1e30f;
+constexpr double kHope = 1.25; ///< how far over its estimate an error may still turn out to fit
+constexpr double kMostBlocks = 1 << 22;
+
+} // namespace
+
+float Collapser::Quadric::at(const Vec3& d) const {
+    const auto x = static_cast<float>(d.x), y = static_cast<float>(d.y),
+               z = static_cast<float>(d.z);
+    return x * (a[0] * x + 2 * (a[1] * y + a[2] * z + b[0])) +
+           y * (a[3] * y + 2 * (a[4] * z + b[1])) + z * (a[5] * z + 2 * b[2]) + c;
+}
+
+void Collapser::Quadric::add(const Quadric& other, const Vec3& d) {
+    // q(x) about other is q(x + s) about this, s = this - other.
+    const auto x = static_cast<float>(-d.x), y = static_cast<float>(-d.y),
+               z = static_cast<float>(-d.z);
+    c += std::max(0.f, other.at(-d));
+    b[0] += other.b[0] + other.a[0] * x + other.a[1] * y + other.a[2] * z;
+    b[1] += other.b[1] + other.a[1] * x + other.a[3] * y + other.a[4] * z;
+    b[2] += other.b[2] + other.a[2] * x + other.a[4] * y + other.a[5] * z;
+    for (std::size_t i = 0; i < 6; ++i)
+        a[i] += other.a[i];
+}
+
+void Collapser::Buckets::push(float cost, const Entry& entry) {
+    const auto bucket = static_cast<std::size_t>(std::bit_cast<std::uint32_t>(cost) >> 21);
+    entries_[bucket].push_back(entry);
+    lowest_ = std::min(lowest_, bucket);
+    ++n_;
+}
+
+Collapser::Entry Collapser::Buckets::pop() {
+    while (entries_[lowest_].empty())
+        ++lowest_;
+    const Entry entry = entries_[lowest_].back();
+    entries_[lowest_].pop_back();
+    if (--n_ == 0)
+        lowest_ = kBuckets;
+    return entry;
+}
+
+Collapser::Collapser(CornerTable& table, std::span<const Vec3> positions,
+                     std::span<const std::uint8_t> frozen, const FaceErrors& errors,
+                     const Rules& rules)
+    : table_(table), positions_(positions), frozen_(frozen), errors_(errors), rules_(rules),
+      quadrics_(positions.size()), stamps_(positions.size(), 0), owners_(positions.size(), 0),
+      inner_(positions.size(), 0), open_(positions.size(), 1), off_(positions.size(), 0),
+      clear_m_(positions.size(), 0), slopes_(positions.size()) {
+    tbb::parallel_for(
+        tbb::blocked_range<std::uint32_t>(0, static_cast<std::uint32_t>(positions.size()), 1024),
+        [&](const auto& range) {
+            for (std::uint32_t v = range.begin(); v < range.end(); ++v) {
+                if (!table_.has_vertex(v))
+                    continue;
+                auto& a = quadrics_[v].a;
+                const Vec3& p = positions_[v];
+                std::uint32_t c = table_.corner(v);
+                do {
+                    const Vec3 n = cross(positions_[table_.vertex(CornerTable::next(c))] - p,
+                                         positions_[table_.vertex(CornerTable::previous(c))] - p);
+                    if (const double w = length(n); w > 0) {
+                        const auto x = static_cast<float>(n.x), y = static_cast<float>(n.y),
+                                   z = static_cast<float>(n.z), s = static_cast<float>(1 / w);
+                        const std::array<float, 6> add = {x * x, x * y, x * z, y * y, y * z, z * z};
+                        for (std::size_t i = 0; i < 6; ++i)
+                            a[i] += add[i] * s;
+                    }
+                    c = table_.swing(c);
+                } while (c != table_.corner(v));
+                const auto shapes = errors_.shapes(errors_.labels()[v]);
+                off_[v] = shapes.empty();
+                for (const std::uint32_t shape : shapes) {
+                    const FieldProbe::Value at = errors_.of(shape, p);
+                    off_[v] |= std::abs(at.value_m) > rules_.off_m;
+                    if (shapes.size() == 1 && !errors_.has_closed_form(shape))
+                        slopes_[v] = {shape,
+                                      {static_cast<float>(at.gradient.x),
+                                       static_cast<float>(at.gradient.y),
+                                       static_cast<float>(at.gradient.z)}};
+                }
+                clear_m_[v] = static_cast<float>(errors_.clearance(p, errors_.labels()[v]));
+            }
+        });
+}
+
+double Collapser::mean_edge_m() const {
+    double sum = 0;
+    std::size_t n = 0;
+    for (std::size_t t = 0; t < table_.n_triangles(); ++t) {
+        if (!table_.has_triangle(t))
+            continue;
+        const Triangle v = table_.triangle(t);
+        for (std::size_t k = 0; k < 3; ++k, ++n)
+            sum += length(positions_[v[k]] - positions_[v[(k + 1) % 3]]);
+    }
+    return n == 0 ? 0 : sum / static_cast<double>(n);
+}
+
+Collapser::Blocks Collapser::divide(double block_m, double shift_m) {
+    Box box;
+    for (std::uint32_t v = 0; v < positions_.size(); ++v)
+        if (table_.has_vertex(v))
+            box.include(positions_[v]);
+    const Vec3 size = box.size() + Vec3{1, 1, 1} * shift_m;
+    const double side = std::max(block_m, std::cbrt(size.x * size.y * size.z / kMostBlocks));
+    const auto count = [&](double x) { return static_cast<std::uint32_t>(x / side) + 1; };
+    const std::uint32_t ny = count(size.y), nz = count(size.z), n = count(size.x) * ny * nz;
+    Blocks blocks;
+    blocks.first.assign(n + 1, 0);
+    std::size_t n_left = 0;
+    for (std::uint32_t v = 0; v < positions_.size(); ++v) {
+        if (!table_.has_vertex(v))
+            continue;
+        const Vec3 p = positions_[v] - box.lo + Vec3{1, 1, 1} * shift_m;
+        const auto at = [&](double x) { return static_cast<std::uint32_t>(x / side); };
+        owners_[v] = (at(p.x) * ny + at(p.y)) * nz + at(p.z);
+        ++blocks.first[owners_[v] + 1];
+        ++n_left;
+    }
+    for (std::uint32_t b = 0; b < n; ++b)
+        blocks.first[b + 1] += blocks.first[b];
+    std::vector<std::uint32_t> at(blocks.first.begin(), blocks.first.end() - 1);
+    blocks.vertices.resize(n_left);
+    for (std::uint32_t v = 0; v < positions_.size(); ++v)
+        if (table_.has_vertex(v))
+            blocks.vertices[at[owners_[v]]++] = v;
+    return blocks;
+}
+
+void Collapser::pass(double block_m, double shift_m, Progress* progress) {
+    const Blocks blocks = divide(block_m, shift_m);
+    tbb::enumerable_thread_specific<Buckets> queues;
+    std::atomic<std::size_t> n_done{0};
+    const std::size_t n = blocks.first.size() - 1, step = std::max<std::size_t>(1, n / 100);
+    tbb::parallel_for(std::size_t{0}, n, [&](std::size_t b) {
+        if (progress && progress->cancelled())
+            return;
+        run(std::span(blocks.vertices)
+                .subspan(blocks.first[b], blocks.first[b + 1] - blocks.first[b]),
+            queues.local());
+        if (const std::size_t done = ++n_done; done % step == 0)
+            report_fraction(progress, static_cast<double>(done) / static_cast<double>(n));
+    });
+    check_cancelled(progress);
+}
+
+void Collapser::run(std::span<const std::uint32_t> vertices, Buckets& queue) {
+    const auto each_neighbour = [&](std::uint32_t v, auto&& visit) {
+        std::uint32_t c = table_.corner(v);
+        do {
+            visit(table_.vertex(CornerTable::next(c)));
+            c = table_.swing(c);
+        } while (c != table_.corner(v));
+    };
+    // A collapse takes place among inner vertices and leaves them inner, so this is known once.
+    for (const std::uint32_t v : vertices) {
+        bool inner = true;
+        each_neighbour(v, [&](std::uint32_t u) { inner = inner && owners_[u] == owners_[v]; });
+        inner_[v] = inner;
+    }
+    for (const std::uint32_t v : vertices)
+        if (inner_[v])
+            each_neighbour(v, [&](std::uint32_t u) {
+                if (v < u && inner_[u] && (open_[u] || open_[v]))
+                    push(v, u, queue);
+            });
+    while (!queue.empty()) {
+        const Entry e = queue.pop();
+        if (!table_.has_vertex(e.a) || !table_.has_vertex(e.b) || stamps_[e.a] != e.stamp_a ||
+            stamps_[e.b] != e.stamp_b)
+            continue;
+        std::uint32_t kept = e.b;
+        if (!try_collapse(e.a, e.b)) {
+            if (!try_collapse(e.b, e.a))
+                continue;
+            kept = e.a;
+        }
+        ++stamps_[kept];
+        each_neighbour(kept, [&](std::uint32_t u) {
+            if (inner_[u])
+                push(kept, u, queue);
+        });
+    }
+    for (const std::uint32_t v : vertices) {
+        if (!table_.has_vertex(v))
+            continue;
+        bool open = !inner_[v];
+        each_neighbour(
+            v, [&](std::uint32_t u) { open = open || owners_[u] != owners_[v] || !inner_[u]; });
+        open_[v] = open;
+    }
+}
+
+bool Collapser::may_move(std::uint32_t a, std::uint32_t b) const {
+    if (off_[b] || frozen_[a])
+        return false;
+    const std::uint32_t la = errors_.labels()[a], lb = errors_.labels()[b];
+    return off_[a] || (errors_.within(la, lb) && errors_.n_primitives(la) < PrimitiveSet::kMost);
+}
+
+float Collapser::cost(std::uint32_t a, std::uint32_t b) const {
+    if (off_[a])
+        return kAtOnce;
+    const Vec3 d = positions_[b] - positions_[a];
+    return std::max(0.f, quadrics_[a].at(d)) + quadrics_[b].c +
+           kLengthWeight * static_cast<float>(length_squared(d));
+}
+
+void Collapser::push(std::uint32_t a, std::uint32_t b, Buckets& queue) const {
+    const bool there = may_move(a, b), back = may_move(b, a);
+    if (!there && !back)
+        return;
+    const float to_b = there ? cost(a, b) : kNever, to_a = back ? cost(b, a) : kNever;
+    if (to_a < to_b)
+        std::swap(a, b);
+    queue.push(std::min(to_a, to_b), {a, b, stamps_[a], stamps_[b]});
+}
+
+bool Collapser::try_collapse(std::uint32_t a, std::uint32_t b) {
+    if (!may_move(a, b))
+        return false;
+    Ring ring_a, ring_b;
+    if (!table_.ring(a, ring_a) || !table_.ring(b, ring_b) ||
+        ring_a.n + ring_b.n > kMostValence + 4)
+        return false;
+    const std::uint32_t c = table_.collapsible(a, b, ring_a, ring_b);
+    if (c == kNone || !shapely(a, b, ring_a) || !legal(b, ring_a))
+        return false;
+    table_.collapse(c, ring_a);
+    quadrics_[b].add(quadrics_[a], positions_[a] - positions_[b]);
+    return true;
+}
+
+/// Whether the cubic through the values and gradients at both ends of an edge leaves hope that its
+/// middle is near enough; spares most of the samples that would say no.
+bool Collapser::may_fit(std::uint32_t a, std::uint32_t b) const {
+    const Slope &s = slopes_[a], &t = slopes_[b];
+    if (s.shape == FaceErrors::kNone || s.shape != t.shape)
+        return true;
+    const Vec3 d = positions_[b] - positions_[a];
+    const double at_middle =
+        ((s.gradient[0] - t.gradient[0]) * d.x + (s.gradient[1] - t.gradient[1]) * d.y +
+         (s.gradient[2] - t.gradient[2]) * d.z) /
+        8;
+    return std::abs(at_middle) <= kHope * (rules_.face.centred ? 2 : 1) * rules_.face.face_m;
+}
+
+/// Whether no face turns over, or becomes a sliver.
+bool Collapser::shapely(std::uint32_t a, std::uint32_t b, const Ring& ring) const {
+    const Vec3 &from = positions_[a], &to = positions_[b];
+    for (const std::uint32_t c : ring.all()) {
+        const std::uint32_t v = table_.vertex(CornerTable::next(c)),
+                            w = table_.vertex(CornerTable::previous(c));
+        if (v == b || w == b)
+            continue;
+        if (!may_fit(b, v))
+            return false;
+        const Vec3 &p = positions_[v], &q = positions_[w];
+        const Vec3 before = cross(p - from, q - from), after = cross(p - to, q - to);
+        const double area_before = length(before), area = length(after), e = length_squared(q - p),
+                     edge = std::max({e, length_squared(p - to), length_squared(q - to)});
+        if (dot(before, after) <= rules_.least_turn * area_before * area)
+            return false;
+        if (area < rules_.least_quality * edge &&
+            area * std::max({e, length_squared(p - from), length_squared(q - from)}) <
+                area_before * edge)
+            return false;
+    }
+    return true;
+}
+
+bool Collapser::legal(std::uint32_t b, const Ring& ring) const {
+    const auto& labels = errors_.labels();
+    FaceErrors::Rules rules = rules_.face;
+    rules.clear_m = 0.999 * static_cast<double>(clear_m_[b]); // rounded to single precision
+    for (const std::uint32_t c : ring.all()) {
+        const std::uint32_t v = table_.vertex(CornerTable::next(c)),
+                            w = table_.vertex(CornerTable::previous(c));
+        if (v == b || w == b)
+            continue;
+        rules.exact_corners = !off_[v] && !off_[w];
+        if (errors_.bound({positions_[b], positions_[v], positions_[w]},
+                          {labels[b], labels[v], labels[w]},
+                          rules) == std::numeric_limits<double>::infinity())
+            return false;
+    }
+    return true;
+}
+
+} // namespace taihu

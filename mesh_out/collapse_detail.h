@@ -1,0 +1,91 @@
+#pragma once
+#include <array>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "mesh_out/corner_table_detail.h"
+#include "mesh_out/face_error_detail.h"
+#include "stats/core/progress.h"
+
+namespace taihu {
+
+/// Half-edge collapses in the order of quadrics: vertices stay where they are, so what lies on the
+/// surface stays on it, and rims only thin along themselves. A vertex belongs to the block of its
+/// position; one block is one task, and works only where the rings of both ends lie in it: no
+/// locks, and the same mesh on any number of threads.
+class Collapser {
+public:
+    struct Rules {
+        FaceErrors::Rules face;
+        double least_quality = 0.06; ///< area over squared edge; a worse face may not get worse
+        double least_turn = 0.3;     ///< cosine of how far one collapse may turn a face
+        double off_m = 0;            ///< vertices farther from their primitives go first
+    };
+
+    /// \param frozen  per vertex: stays.
+    Collapser(CornerTable& table, std::span<const Vec3> positions,
+              std::span<const std::uint8_t> frozen, const FaceErrors& errors, const Rules& rules);
+    /// One pass over all blocks of one lattice. \throws Error cancelled.
+    void pass(double block_m, double shift_m, Progress* progress);
+    /// The mean length of the edges that are left.
+    double mean_edge_m() const;
+
+private:
+    using Ring = CornerTable::Ring;
+    struct Quadric { ///< of squared distances to planes, about the vertex itself
+        std::array<float, 6> a{};
+        std::array<float, 3> b{};
+        float c = 0;
+        float at(const Vec3& d) const;
+        /// Adds `other`, whose vertex lies at `d` from this one.
+        void add(const Quadric& other, const Vec3& d);
+    };
+    struct Entry {
+        std::uint32_t a, b, stamp_a, stamp_b;
+    };
+    /// A queue by the leading bits of the cost, last in first out among equals.
+    class Buckets {
+    public:
+        void push(float cost, const Entry& entry);
+        bool empty() const { return n_ == 0; }
+        Entry pop();
+
+    private:
+        static constexpr std::size_t kBuckets = 1024;
+        std::vector<std::vector<Entry>> entries_{kBuckets};
+        std::size_t lowest_ = kBuckets, n_ = 0;
+    };
+    struct Blocks {
+        std::vector<std::uint32_t> first, vertices;
+    };
+
+    Blocks divide(double block_m, double shift_m);
+    void run(std::span<const std::uint32_t> vertices, Buckets& queue);
+    void push(std::uint32_t a, std::uint32_t b, Buckets& queue) const;
+    bool may_move(std::uint32_t a, std::uint32_t b) const;
+    bool try_collapse(std::uint32_t a, std::uint32_t b);
+    bool legal(std::uint32_t b, const Ring& ring) const;
+    bool may_fit(std::uint32_t a, std::uint32_t b) const;
+    bool shapely(std::uint32_t a, std::uint32_t b, const Ring& ring) const;
+    float cost(std::uint32_t a, std::uint32_t b) const;
+
+    CornerTable& table_;
+    std::span<const Vec3> positions_;
+    std::span<const std::uint8_t> frozen_;
+    const FaceErrors& errors_;
+    Rules rules_;
+    std::vector<Quadric> quadrics_;
+    std::vector<std::uint32_t> stamps_, owners_;
+    std::vector<std::uint8_t> inner_; ///< the ring lies in the block of the vertex
+    std::vector<std::uint8_t> open_;  ///< not yet tried with its whole ring in one block
+    std::vector<std::uint8_t> off_;
+    std::vector<float> clear_m_; ///< FaceErrors::clearance()
+    struct Slope {
+        std::uint32_t shape = FaceErrors::kNone;
+        std::array<float, 3> gradient{};
+    };
+    std::vector<Slope> slopes_; ///< of the one primitive that a vertex lies on, if not a ball
+};
+
+} // namespace taihu

@@ -1,0 +1,139 @@
+#pragma once
+#include <array>
+#include <cstdint>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "mesh_out/labelled_mesh.h"
+
+namespace taihu {
+
+/// What a field says of a mesh near its surface, prepared for very many questions about faces:
+/// which primitives come near (lists per cell of a lattice), closed forms of balls, label sets as
+/// numbers. Thread-safe.
+class FaceErrors {
+public:
+    using Corners = std::array<Vec3, 3>;
+    using Labels = std::array<std::uint32_t, 3>; ///< numbers of label sets, one per corner
+
+    /// \param bound_m  the distances asked about are at most twice this.
+    /// \param spacing_m  of the mesh that `mesh` comes from: nothing finer is looked for.
+    FaceErrors(const LabelledMesh& mesh, const FieldProbe& field, double bound_m, double spacing_m);
+
+    /// The number of the label set of each vertex of the mesh.
+    const std::vector<std::uint32_t>& labels() const { return labels_; }
+    std::size_t n_primitives(std::uint32_t label) const { return sets_[label].size(); }
+    bool within(std::uint32_t a, std::uint32_t b) const {
+        return a == b || sets_[a].within(sets_[b]);
+    }
+    /// The set of primitives, as the field numbers them.
+    PrimitiveSet primitives(std::uint32_t label) const;
+    /// The number of a set of shapes, a new one if need be; not for several threads at once.
+    std::uint32_t label_of(const PrimitiveSet& shapes);
+    const FieldProbe& field() const { return field_; }
+
+    /// The range of values of a primitive over a face [m].
+    struct Range {
+        double lo = 0, hi = 0;
+        Vec3 gradient;          ///< summed over samples; 0 for balls
+        double least_slope = 1; ///< of the samples
+        double most() const { return std::max(-lo, hi); }
+    };
+    /// What one face is judged by.
+    struct Rules {
+        double face_m = 0;         ///< distance to its own primitive, at most
+        double rim_m = 0;          ///< distance past rims, at most
+        bool centred = false;      ///< judge as if values were shifted to be centred on 0
+        double turn_cosine = -1;   ///< of the angle to the gradient at the middle, at least
+        bool exact_corners = true; ///< corners lie on all their primitives
+        bool may_pierce = false;   ///< faces may pass through other primitives, within `rim_m`
+        double clear_m = 0;        ///< clearance() of the first corner, or less
+    };
+    /// The primitives without a closed form that a vertex does not lie on are at least so far.
+    double clearance(const Vec3& p, std::uint32_t label) const;
+    /// An upper bound of the distance from the points of a face to the surface of the solid, as far
+    /// as `rules` ask: infinite when it breaks them. Balls by closed forms, other primitives by
+    /// samples with a margin of their second differences; past a rim, the distance to the rim.
+    double bound(const Corners& face, const Labels& labels, const Rules& rules) const;
+
+    /// The primitives that all three corners share and, of those, the nearest to the face; kNone
+    /// where there is none.
+    /// Values beyond `give_up_m` may end the search for the range.
+    std::uint32_t own(const Corners& face, const Labels& labels, bool exact_corners, Range& range,
+                      double give_up_m = kFar) const;
+    FieldProbe::Value of(std::uint32_t shape, const Vec3& p) const;
+    const PrimitiveSet& set(std::uint32_t label) const { return sets_[label]; }
+    std::span<const std::uint32_t> shapes(std::uint32_t label) const { return sets_[label].all(); }
+
+    /// An upper bound of the distances of all points of a face by surface points found near it;
+    /// slow, and right whatever the labels. Parts are not divided where it is at most `enough_m`;
+    /// beyond `give_up_m` the search ends.
+    double searched(const Corners& face, double enough_m, double give_up_m = kFar) const;
+
+    static constexpr std::uint32_t kNone = 0xffffffffu;
+    static constexpr double kFar = 1e300;
+    bool has_closed_form(std::uint32_t shape) const { return shapes_[shape].is_ball; }
+
+private:
+    struct Shape {
+        Primitive primitive = 0;
+        bool is_ball = false;
+        double sign = 1; ///< of the value outside of the ball
+        Vec3 center;
+        double radius = 0;
+    };
+    /// Two primitives over a face, values turned so that the second is negative where it is far.
+    struct Meeting {
+        std::uint32_t own = 0, other = 0;
+        double turn = 1;
+        Rules rules;
+    };
+
+    void find_shapes(const LabelledMesh& mesh);
+    void find_center_values();
+    std::array<int, 3> coordinates(std::size_t cell) const;
+    void find_near(const LabelledMesh& mesh, std::vector<std::vector<Primitive>>& near);
+    using CornerValues = std::array<double, 3>;
+    Range range(std::uint32_t shape, const Corners& face, const CornerValues* known = nullptr,
+                double give_up_m = kFar) const;
+    double sample(Primitive primitive, const Vec3& p, Range& range) const;
+    Range sampled_range(const Shape& shape, const Corners& face, const CornerValues* known,
+                        double give_up_m, double step) const;
+    double past_rim(const Meeting& meeting, const Corners& face, double own, double other) const;
+    double meeting(const Meeting& meeting, const Corners& face, const Range& own,
+                   const Range& other, int depth) const;
+    double against(std::uint32_t own, const Range& own_range, std::uint32_t other,
+                   const Corners& face, const Labels& labels, const Rules& rules) const;
+    std::span<const std::uint32_t> near(const std::array<int, 3>& cell) const {
+        const std::uint32_t list = cells_[cell_of(cell)];
+        if (list == kNone)
+            return {};
+        return std::span(near_).subspan(first_[list], first_[list + 1] - first_[list]);
+    }
+    std::size_t cell_of(const std::array<int, 3>& c) const {
+        return (static_cast<std::size_t>(c[0]) * n_[1] + static_cast<std::size_t>(c[1])) * n_[2] +
+               static_cast<std::size_t>(c[2]);
+    }
+    int coordinate(double x, int axis) const;
+    Vec3 center_of(const std::array<int, 3>& c) const {
+        return origin_ + Vec3{c[0] + .5, c[1] + .5, c[2] + .5} * cell_;
+    }
+
+    const FieldProbe& field_;
+    double spacing_, pad_, cell_ = 0;
+    Vec3 origin_;
+    std::array<std::size_t, 3> n_{};
+    std::vector<std::uint32_t> cells_;        ///< number of the list of a cell, kNone far away
+    std::vector<std::uint32_t> first_, near_; ///< shapes near each listed cell
+    std::vector<float> center_values_;        ///< of these at the cell's centre, of balls 0
+    std::vector<Shape> shapes_;
+    std::vector<PrimitiveSet> sets_; ///< of shapes, by label number
+    std::vector<std::uint32_t> labels_;
+};
+
+/// A point of the solid's surface near `p`, found by projecting onto the primitives that decide one
+/// after another; none when that leads nowhere within `farthest_m`.
+std::optional<Vec3> surface_point_near(const FieldProbe& field, const Vec3& p, double farthest_m);
+
+} // namespace taihu
