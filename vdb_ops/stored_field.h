@@ -13,6 +13,10 @@ public:
     explicit StoredField(std::shared_ptr<const Field> of);
     std::unique_ptr<LatticeField> on(const Lattice& lattice,
                                      const openvdb::CoordBBox& region) const override;
+    Primitive n_primitives() const override { return of_->n_primitives(); }
+    std::unique_ptr<FieldProbe> probe(const Box& region_m, double reach_m) const override {
+        return of_->probe(region_m, reach_m);
+    }
 
 private:
     std::shared_ptr<const Field> of_;

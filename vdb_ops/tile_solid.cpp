@@ -3,6 +3,7 @@
 #include <cmath>
 
 #include "vdb_ops/combine_field.h"
+#include "vdb_ops/level_set_field.h"
 #include "vdb_ops/rasterize.h"
 #include "vdb_ops/solids_field.h"
 #include "vdb_ops/tiles.h"
@@ -66,6 +67,10 @@ public:
     ContinuedField(const openvdb::FloatGrid& tile, const CoordBBox& box) : tile_(tile), box_(box) {}
     std::unique_ptr<LatticeField> on(const Lattice& lattice, const CoordBBox&) const override {
         return std::make_unique<LatticeContinued>(tile_, box_, lattice.voxel_m);
+    }
+    Primitive n_primitives() const override { return 1; }
+    std::unique_ptr<FieldProbe> probe(const Box& region_m, double reach_m) const override {
+        return LevelSetField(tile_.copy()).probe(region_m, reach_m);
     }
 
 private:
