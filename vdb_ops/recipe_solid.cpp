@@ -87,30 +87,30 @@ std::optional<RecipeLod> lod_of(const json& recipe, const std::string& where, do
     static constexpr std::string_view kKeys[] = {"levels",    "bound_m", "factor",   "bounds_m",
                                                  "triangles", "uniform", "openness", "origin"};
     const std::string inside = where + ": lod";
-    const json& json = recipe["lod"];
-    check_keys(json, inside, {}, kKeys);
+    const json& own = recipe["lod"];
+    check_keys(own, inside, {}, kKeys);
     RecipeLod lod;
-    const auto kinds = json.contains("levels") + json.contains("bounds_m") +
-                       json.contains("triangles") + json_flag(json, inside, "uniform", false);
+    const auto kinds = own.contains("levels") + own.contains("bounds_m") +
+                       own.contains("triangles") + json_flag(own, inside, "uniform", false);
     if (kinds != 1)
         throw Error(Fault::bad_input,
                     inside + ": give 'levels', 'bounds_m', 'triangles' or 'uniform'");
-    if (json.contains("levels")) {
-        const double n = json_number(json, inside, "levels", 1, kMostLevels),
-                     bound_m = json_number(json, inside, "bound_m", 1e-9, 1e6),
-                     factor = json_number(json, inside, "factor", 1.01, 100);
+    if (own.contains("levels")) {
+        const double n = json_number(own, inside, "levels", 1, kMostLevels),
+                     bound_m = json_number(own, inside, "bound_m", 1e-9, 1e6),
+                     factor = json_number(own, inside, "factor", 1.01, 100);
         for (int j = 0; j < static_cast<int>(n); ++j)
             lod.bounds_m.push_back(scale * bound_m * std::pow(factor, j));
-    } else if (json.contains("bounds_m")) {
-        lod.bounds_m = level_list<double>(json, inside, "bounds_m", 1e-9, 1e6, true);
+    } else if (own.contains("bounds_m")) {
+        lod.bounds_m = level_list<double>(own, inside, "bounds_m", 1e-9, 1e6, true);
         for (double& bound_m : lod.bounds_m)
             bound_m *= scale;
-    } else if (json.contains("triangles")) {
-        lod.triangles = level_list<std::uint64_t>(json, inside, "triangles", 4, 1e9, false);
+    } else if (own.contains("triangles")) {
+        lod.triangles = level_list<std::uint64_t>(own, inside, "triangles", 4, 1e9, false);
     }
-    lod.openness = json_flag(json, inside, "openness", true);
-    if (json.contains("origin")) {
-        const std::string origin = json_text(json, inside, "origin");
+    lod.openness = json_flag(own, inside, "openness", true);
+    if (own.contains("origin")) {
+        const std::string origin = json_text(own, inside, "origin");
         if (origin != "foot" && origin != "world")
             throw Error(Fault::bad_input, inside + ": 'origin' must be foot or world");
         lod.at_foot = origin == "foot";

@@ -60,7 +60,7 @@ TEST(Recipe, ASolidCanBeBuiltOn) {
     const std::string ball = shape_node({.kind = ShapeKind::sphere});
     const std::string recipe = format_recipe(ball, 0.01, 0);
     EXPECT_EQ(recipe_solid(recipe), ball);
-    const std::string chain = format_recipe(ball, 0.01, 0, RecipeLod{4, 0.005, 2});
+    const std::string chain = format_recipe(ball, 0.01, 0, RecipeLod{.bounds_m = {0.005, 0.01}, .triangles = {}});
     EXPECT_EQ(recipe_solid(chain), ball);
     EXPECT_THAT(chain, testing::HasSubstr(R"("lod":{"levels":4,"bound_m":0.005,"factor":2.0})"));
 }
