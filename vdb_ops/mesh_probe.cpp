@@ -249,6 +249,13 @@ public:
             if (role == Shell::Role::sheet)
                 continue;
             Nearest shell = shell_at(s, p);
+            if (mesh_.rule == ShellRule::parity) { // in one of both: the nearer one decides
+                const bool in = (shell.value_m < 0) != (at.value_m < 0);
+                if (std::fabs(shell.value_m) < std::fabs(at.value_m))
+                    at = shell;
+                at.value_m = std::copysign(at.value_m, in ? -1.0 : 1.0);
+                continue;
+            }
             if (role == Shell::Role::cavity)
                 shell.value_m = -shell.value_m;
             if (role == Shell::Role::cavity ? shell.value_m > at.value_m
@@ -281,8 +288,8 @@ public:
         }
         if (least2 == std::numeric_limits<double>::infinity())
             return {reach_m_, {}}; // not in the region
-        const Shell& shell = mesh_.shells[mesh_.shell_of[nearest]];
-        const bool turned = (shell.volume_m3 < 0) != (shell.role == Shell::Role::cavity);
+        const std::uint32_t s = mesh_.shell_of[nearest];
+        const bool turned = (mesh_.shells[s].volume_m3 < 0) != bounds_void(s, best.point);
         const Vec3 normal = face_normal(mesh_, nearest) * (turned ? -1.0 : 1.0);
         return {dot(normal, p - best.point), normal};
     }
@@ -319,6 +326,17 @@ private:
     Corners corners(std::uint32_t face) const {
         const Triangle& t = mesh_.triangles[face];
         return {mesh_.positions[t[0]], mesh_.positions[t[1]], mesh_.positions[t[2]]};
+    }
+
+    /// Whether what a shell holds is void where its face is at `p`.
+    bool bounds_void(std::uint32_t s, const Vec3& p) const {
+        if (mesh_.rule != ShellRule::parity)
+            return mesh_.shells[s].role == Shell::Role::cavity;
+        bool in = false;
+        for (std::uint32_t other = 0; other < mesh_.shells.size(); ++other)
+            if (other != s && mesh_.shells[other].role != Shell::Role::sheet)
+                in ^= winding_at(other, p) != 0;
+        return in;
     }
 
     Nearest shell_at(std::uint32_t s, const Vec3& p) const {

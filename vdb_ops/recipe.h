@@ -39,8 +39,8 @@ std::string clean_node(const std::string& of, const CleanSettings& settings);
 
 /// How a recipe's surface is written; meshes other than GLB are its first level.
 struct RecipeLod {
-    std::vector<double> bounds_m;         ///< of each level, finest first, or
-    std::vector<std::uint64_t> triangles; ///< how many each has, or neither:
+    std::vector<double> bounds_m = {};         ///< of each level, finest first, or
+    std::vector<std::uint64_t> triangles = {}; ///< how many each has, or neither:
     bool uniform() const { return bounds_m.empty() && triangles.empty(); } ///< the plain extraction
     bool openness = true; ///< ambient occlusion in a GLB's vertex colours
     bool at_foot = false; ///< the origin is moved to the middle of the foot

@@ -210,6 +210,10 @@ TEST(Probes, OfMeshes) {
     flip(cavity);
     append(many, cavity);
     expect_probe(MeshField(close_mesh(many, "cubes")), kExact);
+    // Two that overlap: where both are is void, so faces bound the solid from either side.
+    TriMesh two = cube({0.31, 0.27, 0.4});
+    append(two, cube());
+    expect_probe(MeshField(close_mesh(two, "cubes", {.shells = ShellRule::parity})), kExact);
 }
 
 TEST(Probes, TellSmoothPartsOfMeshesApart) {

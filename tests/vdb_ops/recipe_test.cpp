@@ -60,9 +60,9 @@ TEST(Recipe, ASolidCanBeBuiltOn) {
     const std::string ball = shape_node({.kind = ShapeKind::sphere});
     const std::string recipe = format_recipe(ball, 0.01, 0);
     EXPECT_EQ(recipe_solid(recipe), ball);
-    const std::string chain = format_recipe(ball, 0.01, 0, RecipeLod{.bounds_m = {0.005, 0.01}, .triangles = {}});
+    const std::string chain = format_recipe(ball, 0.01, 0, RecipeLod{.bounds_m = {0.005, 0.01}});
     EXPECT_EQ(recipe_solid(chain), ball);
-    EXPECT_THAT(chain, testing::HasSubstr(R"("lod":{"levels":4,"bound_m":0.005,"factor":2.0})"));
+    EXPECT_THAT(chain, testing::HasSubstr(R"("lod":{"bounds_m":[0.005,0.01]})"));
 }
 
 TEST(Recipe, WhatIsNoneIsSaid) {
