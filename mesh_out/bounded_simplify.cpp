@@ -95,10 +95,10 @@ LabelledMesh BoundedSimplifier::collapse(double bound_m, std::span<const std::ui
     return compact(table, mesh_);
 }
 
-BoundedMesh BoundedSimplifier::level(double bound_m, LabelledMesh& collapsed,
-                                     Progress* progress) const {
-    std::vector<std::uint8_t> frozen(mesh_.positions.size(), 0);
-    std::vector<Sphere> crossings;
+BoundedMesh BoundedSimplifier::level(double bound_m, std::span<const Sphere> kept,
+                                     LabelledMesh& collapsed, Progress* progress) const {
+    std::vector<Sphere> crossings(kept.begin(), kept.end());
+    std::vector<std::uint8_t> frozen = near(mesh_.positions, crossings, 0);
     // Balancing and splitting may make faces cross: not there, then. If that does not help, the
     // input stays round them; it does not cross itself.
     for (int trial = 0;; ++trial) {
@@ -128,12 +128,13 @@ BoundedMesh BoundedSimplifier::level(double bound_m, LabelledMesh& collapsed,
     }
 }
 
-BoundedMesh BoundedSimplifier::within(double bound_m, Progress* progress) {
+BoundedMesh BoundedSimplifier::within(double bound_m, std::span<const Sphere> kept,
+                                      Progress* progress) {
     require(bound_m > 0 && std::isfinite(bound_m) && bound_m >= bound_m_,
             "bound_m is " + rounded(bound_m) + ", must be finite, > 0 and not below " +
                 rounded(bound_m_) + " of the level before");
     LabelledMesh collapsed;
-    BoundedMesh out = level(bound_m, collapsed, progress);
+    BoundedMesh out = level(bound_m, kept, collapsed, progress);
     mesh_ = std::move(collapsed);
     bound_m_ = bound_m;
     return out;
@@ -152,7 +153,7 @@ BoundedMesh BoundedSimplifier::to_triangles(std::size_t n, Progress* progress) {
     double bound = fine > 0 ? fine : kFirstBound * settings_.spacing_m;
     for (int trial = 0; trial < kMostTrials; ++trial) {
         LabelledMesh collapsed;
-        BoundedMesh out = level(bound, collapsed, progress);
+        BoundedMesh out = level(bound, {}, collapsed, progress);
         const std::size_t count = out.mesh.triangles.size();
         if (count > n) {
             fine = bound;

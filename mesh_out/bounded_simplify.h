@@ -49,9 +49,11 @@ public:
     ///   one label set for each position, no closed 2-manifold.
     BoundedSimplifier(LabelledMesh mesh, const FieldProbe& field, const BoundedSettings& settings);
 
-    /// \param bound_m  at least that of the call before.
+    /// \param bound_m  at least that of the call before. \param kept  what lies in these balls
+    /// stays as it came.
     /// \throws Error bad_argument: another bound; cancelled: within one block.
-    BoundedMesh within(double bound_m, Progress* progress = nullptr);
+    BoundedMesh within(double bound_m, std::span<const Sphere> kept = {},
+                       Progress* progress = nullptr);
     /// At most `n`, and within 2 % of it, by searching the bound from that of the call before.
     /// \throws Error bad_argument: n below 4 or above what there is; numeric: no bound up to the
     ///   size of the solid leads there; cancelled.
@@ -61,7 +63,8 @@ private:
     LabelledMesh collapse(double bound_m, std::span<const std::uint8_t> frozen,
                           Progress* progress) const;
     /// \param collapsed  becomes the surface before it is balanced and mended.
-    BoundedMesh level(double bound_m, LabelledMesh& collapsed, Progress* progress) const;
+    BoundedMesh level(double bound_m, std::span<const Sphere> kept, LabelledMesh& collapsed,
+                      Progress* progress) const;
 
     LabelledMesh mesh_; ///< on the surface, of the last level
     const FieldProbe& field_;

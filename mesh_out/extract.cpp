@@ -15,6 +15,7 @@
 
 #include "mesh_out/level_set_check_detail.h"
 #include "stats/core/error.h"
+#include "stats/number_detail.h"
 
 namespace taihu {
 namespace {
@@ -23,12 +24,14 @@ using Quads = std::vector<openvdb::Vec4I>;
 
 struct DualMesh {
     std::vector<openvdb::Vec3s> points;
+    std::vector<openvdb::Vec3I> triangles; ///< none unless it is adaptive
     Quads quads;
 };
 
-DualMesh dual_mesh(const openvdb::FloatGrid& solid) {
+DualMesh dual_mesh(const openvdb::FloatGrid& solid, double adaptivity) {
     DualMesh result;
-    openvdb::tools::volumeToMesh(solid, result.points, result.quads);
+    openvdb::tools::volumeToMesh(solid, result.points, result.triangles, result.quads, 0.0,
+                                 adaptivity);
     return result;
 }
 
@@ -57,6 +60,8 @@ TriMesh split_quads(const openvdb::FloatGrid& solid, const DualMesh& dual) {
                 mesh.triangles[2 * i + 1] = along_ac ? Triangle{a, c, d} : Triangle{b, d, a};
             }
         });
+    for (const openvdb::Vec3I& t : dual.triangles)
+        mesh.triangles.push_back({t[2], t[1], t[0]});
     return mesh;
 }
 
@@ -131,9 +136,16 @@ void refuse_clipped(const openvdb::FloatGrid& solid) {
 }
 
 TriMesh extract_uniform(const openvdb::FloatGrid& solid, Progress* progress) {
+    return extract_openvdb(solid, 0, progress);
+}
+
+TriMesh extract_openvdb(const openvdb::FloatGrid& solid, double adaptivity, Progress* progress) {
     require_level_set(solid);
+    if (!(adaptivity >= 0 && adaptivity <= 1))
+        throw Error(Fault::bad_argument,
+                    "extract: an adaptivity of " + shortest(adaptivity) + ", must be 0..1");
     check_cancelled(progress);
-    TriMesh mesh = split_quads(solid, dual_mesh(solid));
+    TriMesh mesh = split_quads(solid, dual_mesh(solid, adaptivity));
     // [voxels]; the smaller one is still well above what float resolves a thousand voxels out.
     for (const double least_vox : {1e-3, 1e-2}) {
         check_cancelled(progress);
@@ -141,7 +153,7 @@ TriMesh extract_uniform(const openvdb::FloatGrid& solid, Progress* progress) {
             break;
         const auto clear =
             without_zeros(solid, static_cast<float>(least_vox * solid.voxelSize()[0]));
-        mesh = split_quads(*clear, dual_mesh(*clear));
+        mesh = split_quads(*clear, dual_mesh(*clear, adaptivity));
     }
     if (mesh.triangles.empty())
         refuse_empty(solid);

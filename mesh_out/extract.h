@@ -47,6 +47,11 @@ std::vector<Vec3> surface_normals(const LabelledMesh& mesh, const FieldProbe& fi
 ///   the narrow band (a clipped grid), or the mesh did not come out closed.
 TriMesh extract_uniform(const openvdb::FloatGrid& solid, Progress* progress = nullptr);
 
+/// The same mesher with larger polygons where the surface is flatter: `adaptivity` 0..1, 0 as
+/// extract_uniform(). A yardstick: its error has no bound, and its triangles may cross.
+TriMesh extract_openvdb(const openvdb::FloatGrid& solid, double adaptivity,
+                        Progress* progress = nullptr);
+
 /// Unit normals at `points` from the gradient of the level set (trilinear, central differences).
 std::vector<Vec3> surface_normals(const openvdb::FloatGrid& solid, const std::vector<Vec3>& points);
 

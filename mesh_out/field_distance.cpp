@@ -42,16 +42,20 @@ struct Sum {
     double most = 0, apart = 0, squares = 0;
     Vec3 worst;
     std::size_t n = 0;
+    std::vector<Vec3> beyond;
 
-    void add(const Vec3& p, double d, std::span<const Sphere> balls) {
-        const bool is_apart = std::any_of(balls.begin(), balls.end(), [&](const Sphere& b) {
-            return length(p - b.center) <= b.radius_m;
-        });
+    void add(const Vec3& p, double d, double limit_m, std::span<const Sphere> balls) {
         ++n;
         squares += d * d;
-        if (is_apart) {
-            apart = std::max(apart, d);
-        } else if (d > most) {
+        if (d > limit_m) {
+            if (std::any_of(balls.begin(), balls.end(),
+                            [&](const Sphere& b) { return length(p - b.center) <= b.radius_m; })) {
+                apart = std::max(apart, d);
+                return;
+            }
+            beyond.push_back(p);
+        }
+        if (d > most) {
             most = d;
             worst = p;
         }
@@ -60,6 +64,7 @@ struct Sum {
         n += other.n;
         squares += other.squares;
         apart = std::max(apart, other.apart);
+        beyond.insert(beyond.end(), other.beyond.begin(), other.beyond.end());
         if (other.most > most) {
             most = other.most;
             worst = other.worst;
@@ -101,7 +106,8 @@ void each_sample(const TriMesh& mesh, std::size_t face, double spacing_m, Fn&& f
 } // namespace
 
 FieldDistance field_distance(const TriMesh& mesh, const FieldProbe& field, const TriMesh& surface,
-                             double spacing_m, std::span<const Sphere> apart, Progress* progress) {
+                             double spacing_m, double limit_m, std::span<const Sphere> apart,
+                             Progress* progress) {
     if (mesh.triangles.empty() || surface.triangles.empty())
         throw Error(Fault::bad_argument, "field distance: a mesh is empty; give one with faces");
     if (!(spacing_m >= 1e-5 * bounds(mesh).longest()))
@@ -112,11 +118,11 @@ FieldDistance field_distance(const TriMesh& mesh, const FieldProbe& field, const
     const Sum there = summed(mesh.triangles.size(), progress, [&](std::size_t f, Sum& sum) {
         each_sample(mesh, f, spacing_m, [&](const Vec3& p) {
             const auto d = reached(field, p, spacing_m);
-            sum.add(p, d ? *d : to_surface(p), apart);
+            sum.add(p, d ? *d : to_surface(p), limit_m, apart);
         });
     });
     const Sum back = summed(surface.positions.size(), progress, [&](std::size_t i, Sum& sum) {
-        sum.add(surface.positions[i], to_mesh(surface.positions[i]), apart);
+        sum.add(surface.positions[i], to_mesh(surface.positions[i]), limit_m, apart);
     });
     FieldDistance result;
     result.max_to_field_m = there.most;
@@ -126,6 +132,8 @@ FieldDistance field_distance(const TriMesh& mesh, const FieldProbe& field, const
     result.rms_m = std::max(there.rms(), back.rms());
     result.max_apart_m = std::max(there.apart, back.apart);
     result.n_samples = there.n + back.n;
+    result.beyond = there.beyond;
+    result.beyond.insert(result.beyond.end(), back.beyond.begin(), back.beyond.end());
     return result;
 }
 

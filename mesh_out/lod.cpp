@@ -1,7 +1,9 @@
 #include "mesh_out/lod.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <cstdint>
 #include <cstdio>
 #include <memory>
 #include <optional>
@@ -9,6 +11,7 @@
 
 #include <nlohmann/json.hpp>
 
+#include "mesh_out/crossings_detail.h"
 #include "mesh_out/extract.h"
 #include "mesh_out/field_distance.h"
 #include "mesh_out/openness.h"
@@ -19,9 +22,11 @@
 namespace taihu {
 namespace {
 
-constexpr double kRoundingShare = 0.1; ///< of a bound, for moving vertices onto the grid
-constexpr double kTightest = 0.75;     ///< by how much one more attempt may lower the inner bound
-constexpr int kAttempts = 4, kMostLevels = 8;
+constexpr double kRoundingShare = 0.1;  ///< of a bound, for moving vertices onto the grid
+constexpr double kTightest = 0.9;       ///< by how much one more attempt may lower the inner bound
+constexpr double kMostBeyond = 0.01;    ///< share of samples over a bound that is held at all
+constexpr double kLeastMove = 1.0 / 64; ///< of what rounding may take, where faces would cross
+constexpr int kAttempts = 4, kMostLevels = 8, kMostBits = 18;
 constexpr int kReportVersion = 1;
 
 std::string shown(double value) {
@@ -72,7 +77,15 @@ private:
     double max_move_m(double bound_m) const {
         return std::min(kRoundingShare * bound_m, box_.longest() / 8);
     }
-    LodLevel written(const BoundedMesh& mesh, double bound_m) const;
+    /// A level, and where it is not what it should be.
+    struct Written {
+        LodLevel level;
+        std::vector<Vec3> beyond, crossings;
+        std::size_t n_samples = 0;
+    };
+    TriMesh snapped(const BoundedMesh& mesh, double bound_m, PositionGrid& grid) const;
+    Written written(const BoundedMesh& mesh, double bound_m) const;
+    std::vector<Sphere> around(const std::vector<Vec3>& points, double radius_m) const;
     bool within(double bound_m, LodLevel& level);
     LodLevel of_triangles(std::size_t n);
 
@@ -120,18 +133,31 @@ Chain::Chain(const openvdb::FloatGrid& solid, const Field* field, const LodSetti
     last_.emplace(sharp_, *probe_, BoundedSettings{.spacing_m = voxel_m_});
 }
 
+/// On the coarsest position grid of the chain on which no faces cross that did not before.
+TriMesh Chain::snapped(const BoundedMesh& mesh, double bound_m, PositionGrid& grid) const {
+    const TriMesh plain{mesh.mesh.positions, mesh.mesh.triangles,
+                        surface_normals(mesh.mesh, *probe_)};
+    for (double move_m = max_move_m(bound_m);; move_m /= 2) {
+        check_cancelled(progress_);
+        grid = position_grid(box_.dilated(bound_m), move_m, origin_step_m_);
+        TriMesh out = snap_to_grid(plain, grid).mesh;
+        if (grid.bits == kMostBits || move_m < kLeastMove * max_move_m(bound_m) ||
+            count_crossings(out.positions, out.triangles) <= mesh.n_crossings)
+            return out;
+    }
+}
+
 /// `mesh` as a file holds it: snapped, coded, decoded; certified and measured as decoded.
-LodLevel Chain::written(const BoundedMesh& mesh, double bound_m) const {
-    LodLevel level;
+Chain::Written Chain::written(const BoundedMesh& mesh, double bound_m) const {
+    Written out;
+    LodLevel& level = out.level;
     level.bound_m = bound_m;
     level.unresolved = mesh.unresolved;
-    level.grid = position_grid(box_, max_move_m(bound_m), origin_step_m_);
-    TriMesh plain{mesh.mesh.positions, mesh.mesh.triangles, surface_normals(mesh.mesh, *probe_)};
-    TriMesh snapped = snap_to_grid(plain, level.grid).mesh;
+    TriMesh mesh_on_grid = snapped(mesh, bound_m, level.grid);
     if (settings_.openness)
-        snapped.openness = openness(snapped, {}, progress_);
+        mesh_on_grid.openness = openness(mesh_on_grid, {}, progress_);
     check_cancelled(progress_);
-    level.encoded = encode_draco(snapped, level.grid);
+    level.encoded = encode_draco(mesh_on_grid, level.grid);
     const TriMesh& decoded = level.encoded.decoded;
     level.certificate = certify(decoded);
     if (!level.certificate.holds()) {
@@ -141,40 +167,79 @@ LodLevel Chain::written(const BoundedMesh& mesh, double bound_m) const {
         throw Error(Fault::numeric, "lod: the level of bound " + shown(bound_m) +
                                         " m came out with " + what + "; use a smaller bound");
     }
+    if (level.certificate.n_self_intersections > 0)
+        for (const auto& [f, g] : crossing_pairs(decoded.positions, decoded.triangles))
+            for (const std::uint32_t v : decoded.triangles[f])
+                out.crossings.push_back(decoded.positions[v]);
     check_cancelled(progress_);
     std::vector<Sphere> apart;
     for (const UnresolvedPlace& place : mesh.unresolved)
         apart.push_back({place.center, place.radius_m + bound_m});
     // Half a voxel is finer than the reference's own faces; a wide bound need not be known so well.
-    const FieldDistance distance = field_distance(
-        decoded, *probe_, reference_, std::max(0.5 * voxel_m_, 0.5 * bound_m), apart, progress_);
+    FieldDistance distance =
+        field_distance(decoded, *probe_, reference_, std::max(0.5 * voxel_m_, 0.5 * bound_m),
+                       bound_m, apart, progress_);
     level.error_m = distance.max_m;
     level.rms_m = distance.rms_m;
     level.unresolved_error_m = distance.max_apart_m;
-    return level;
+    out.beyond = std::move(distance.beyond);
+    out.n_samples = distance.n_samples;
+    return out;
 }
 
-/// A level within a bound, from the one before. Returns false, and what was nearest to it in
-/// `level`, when rounding does not let it stay within.
+/// Balls round points, one for all that lie in a cube as wide as their radius.
+std::vector<Sphere> Chain::around(const std::vector<Vec3>& points, double radius_m) const {
+    std::vector<std::array<std::int64_t, 3>> cubes;
+    for (const Vec3& p : points) {
+        const Vec3 at = (p - box_.lo) / radius_m;
+        cubes.push_back({std::llround(at.x), std::llround(at.y), std::llround(at.z)});
+    }
+    std::sort(cubes.begin(), cubes.end());
+    cubes.erase(std::unique(cubes.begin(), cubes.end()), cubes.end());
+    std::vector<Sphere> balls;
+    for (const auto& [x, y, z] : cubes)
+        balls.push_back({box_.lo + Vec3{double(x), double(y), double(z)} * radius_m, radius_m});
+    return balls;
+}
+
+/// A level within a bound, from the one before: where it does not hold as decoded, or faces cross,
+/// what was there before stays. What no attempt mends is named. Returns false, and what was nearest
+/// to it in `level`, when that is nearly everywhere.
 bool Chain::within(double bound_m, LodLevel& level) {
     double inner_m = bound_m - max_move_m(bound_m);
-    for (int attempt = 0; attempt < kAttempts; ++attempt) {
+    std::vector<Sphere> kept;
+    for (int attempt = 0;; ++attempt) {
         BoundedSimplifier next = *last_;
-        level = written(next.within(inner_m, progress_), bound_m);
-        if (level.error_m <= bound_m) {
+        Written out = written(next.within(inner_m, kept, progress_), bound_m);
+        level = std::move(out.level);
+        const bool last = attempt + 1 == kAttempts;
+        const double share = double(out.beyond.size()) / double(out.n_samples);
+        if (last && share <= kMostBeyond) {
+            for (const Sphere& ball : around(out.beyond, 2 * voxel_m_))
+                level.unresolved.push_back({ball.center, ball.radius_m, level.error_m});
+            level.unresolved_error_m = std::max(level.unresolved_error_m, level.error_m);
+            level.error_m = std::min(level.error_m, bound_m);
+        }
+        if (level.error_m <= bound_m && (last || out.crossings.empty())) {
             last_.emplace(std::move(next));
             return true;
         }
-        inner_m *= std::max(kTightest, 0.97 * bound_m / level.error_m);
+        if (last)
+            return false;
+        if (share > kMostBeyond)
+            inner_m *= std::max(kTightest, 0.97 * bound_m / level.error_m);
+        out.beyond.insert(out.beyond.end(), out.crossings.begin(), out.crossings.end());
+        const auto more = around(out.beyond, (2 << attempt) * voxel_m_);
+        kept.insert(kept.end(), more.begin(), more.end());
     }
-    return false;
 }
 
 /// A level of so many triangles, whatever its bound then is.
 LodLevel Chain::of_triangles(std::size_t n) {
     const BoundedMesh mesh = last_->to_triangles(n, progress_);
-    LodLevel level = written(mesh, mesh.bound_m / (1 - kRoundingShare));
-    level.bound_m = std::max(level.bound_m, level.error_m);
+    const double bound_m = mesh.bound_m / (1 - kRoundingShare);
+    LodLevel level = written(mesh, bound_m).level;
+    level.bound_m = std::max(bound_m, level.error_m);
     return level;
 }
 

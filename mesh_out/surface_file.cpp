@@ -31,14 +31,16 @@ SurfaceFile format_surface(const openvdb::FloatGrid& solid, const Field* field, 
     EncodedLevel level;
     const bool shaded = format == MeshFormat::glb && settings.openness;
     if (settings.uniform) {
-        const TriMesh surface = extract_uniform(solid, progress);
+        const TriMesh surface = extract_openvdb(solid, settings.adaptivity, progress);
         const PositionGrid grid = finest_grid(bounds(surface));
         level = uniform_level(solid, surface, grid, shaded, progress);
         file.bound_m = 4 * grid.step_m; // a few steps where vertices met
         file.error_m = two_sided_distance(level.decoded, surface, solid.voxelSize().x() / 2).max_m;
     } else {
         LodChain chain = make_lods(
-            solid, field, {.levels = {{settings.max_error_m, 0}}, .openness = shaded}, progress);
+            solid, field,
+            {.levels = {{settings.max_error_m, settings.n_triangles}}, .openness = shaded},
+            progress);
         LodLevel& only = chain.levels.front();
         file.bound_m = only.bound_m;
         file.error_m = only.error_m;

@@ -1,4 +1,5 @@
 #pragma once
+#include <cstdint>
 #include <string>
 
 #include <openvdb/openvdb.h>
@@ -11,11 +12,13 @@
 namespace taihu {
 
 struct SurfaceSettings {
-    bool uniform = false;   ///< the plain extraction instead of an adaptive mesh
-    double max_error_m = 0; ///< bound of the adaptive mesh [m], > 0
-    bool draco = true;      ///< GLB: compressed
-    bool openness = true;   ///< GLB: ambient occlusion in its vertex colours
-    bool at_foot = false;   ///< moved so that the middle of the foot of its box is the origin
+    bool uniform = false;          ///< OpenVDB's mesher instead of an adaptive mesh
+    double adaptivity = 0;         ///< of that one, 0..1
+    double max_error_m = 0;        ///< bound of the adaptive mesh [m], > 0,
+    std::uint64_t n_triangles = 0; ///< or how many it is to have
+    bool draco = true;             ///< GLB: compressed
+    bool openness = true;          ///< GLB: ambient occlusion in its vertex colours
+    bool at_foot = false; ///< moved so that the middle of the foot of its box is the origin
 };
 
 /// A mesh file that is ready to be written, and what was found by reading its bytes again.

@@ -16,6 +16,7 @@
 #include "vdb_ops/estimate.h"
 #include "vdb_ops/level_set_box.h"
 #include "vdb_ops/level_set_field.h"
+#include "vdb_ops/placed_level_set_field.h"
 #include "vdb_ops/rasterize.h"
 #include "vdb_ops/recipe.h"
 
@@ -98,14 +99,28 @@ void tell(const CarveArgs& args, const LawHoles& holes, std::size_t n_unresolved
                     where, *args.placement.porosity);
 }
 
+/// The level set of the base without the holes, as carve() makes it.
+DifferenceField carved_level_set(const Solid& base, const LawHoles& holes) {
+    return {std::make_shared<LevelSetField>(base.grid),
+            std::make_shared<BallsField>(holes.placed.holes)};
+}
+
+/// What its surface is made of.
+std::shared_ptr<const Field> carved_field(const Solid& base, const LawHoles& holes) {
+    std::shared_ptr<const Field> of = base.field;
+    if (!of)
+        of = std::make_shared<PlacedLevelSetField>(base.grid);
+    return std::make_shared<DifferenceField>(std::move(of),
+                                             std::make_shared<BallsField>(holes.placed.holes));
+}
+
 /// The holes taken away tile by tile: only the base is in memory.
 void write_carved_tiles(const CarveArgs& args, const Solid& base, const LawHoles& holes,
                         const TileSettings& settings, const std::string& recipe,
                         const Console& console) {
-    const DifferenceField rock(std::make_shared<LevelSetField>(base.grid),
-                               std::make_shared<BallsField>(holes.placed.holes));
     const TilesResult made =
-        write_tiles(args.out, rock, lattice_of(*base.grid), settings, recipe, console.progress);
+        write_tiles(args.out, carved_level_set(base, holes), lattice_of(*base.grid), settings,
+                    recipe, console.progress);
     const std::string where = args.out.string();
     console.say_all(where, holes.comments);
     console.say("{}: carved {} holes", where, holes.placed.holes.size());
@@ -127,9 +142,7 @@ void refuse_if_too_much(const CarveArgs& args, const Solid& base, const LawHoles
                   .meshed = !is_vdb(args.out)};
     if (!may_exceed(level_set_box(*base.grid), base.measure.voxel_m, use, limit))
         return;
-    const DifferenceField rock(std::make_shared<LevelSetField>(base.grid),
-                               std::make_shared<BallsField>(holes.placed.holes));
-    use.leaves = estimate_size(rock, lattice_of(*base.grid)).n_leaves;
+    use.leaves = estimate_size(carved_level_set(base, holes), lattice_of(*base.grid)).n_leaves;
     refuse_if_over(use, base.measure.voxel_m, limit);
 }
 
@@ -140,16 +153,16 @@ void check_output(const CarveArgs& args, const Console& console) {
         console.may_write(args.out, {args.base.path, args.holes, args.placement.where});
         return args.surface.check(args.out);
     }
-    if (args.surface.any())
-        throw Error(Fault::bad_argument, "--tiles: are level sets; drop --max-error, --uniform and "
-                                         "--no-draco");
+    if (const auto option = args.surface.any())
+        throw Error(Fault::bad_argument, "--tiles: are level sets; drop " + *option);
     console.may_write_tiles(args.out);
 }
 
 void run(const CarveArgs& args, const Console& console) {
     check_output(args, console);
     CleanSettings cleaning = clean_settings(args);
-    const Solid base = read_solid(args.base, console);
+    const bool meshed = !args.tiles.tiles && !is_vdb(args.out);
+    const Solid base = read_solid(args.base, console, meshed ? Surfaces::wanted : Surfaces::none);
     if (!args.min_neck.empty())
         cleaning.min_neck_m = length_m("--min-neck", args.min_neck, base.measure);
     cleaning.foot_deg = args.foot_deg;
@@ -157,7 +170,8 @@ void run(const CarveArgs& args, const Console& console) {
     const LawHoles holes = read_or_place(args, base, console);
     const std::string recipe =
         format_recipe(clean_node(difference_node(base.node, holes.node), cleaning),
-                      base.measure.voxel_m, args.placement.seed.value_or(0));
+                      base.measure.voxel_m, args.placement.seed.value_or(0),
+                      meshed ? args.surface.lod(args.out, base.measure) : std::nullopt);
     if (args.tiles.tiles)
         return write_carved_tiles(args, base, holes, {*args.tiles.tiles, cleaning}, recipe,
                                   console);
@@ -169,7 +183,9 @@ void run(const CarveArgs& args, const Console& console) {
     const CleanResult cleaned = clean(*rock.rock, cleaning, console.progress);
     const std::size_t n_missed = count_missing(holes.placed.holes, *base.grid);
     tell(args, holes, rock.n_unresolved, carved, cleaned, n_missed, console);
-    auto json = write_solid(args.out, *cleaned.solid, recipe, args.surface, console);
+    const auto field = cleaned_field(carved_field(base, holes), cleaned);
+    auto json = write_solid(args.out, *cleaned.solid, field.get(), recipe,
+                            args.surface.settings(base.measure), console);
     json["holes"] = holes.placed.holes.size();
     json["unresolved"] = rock.n_unresolved;
     json["base_m3"] = carved.base_m3;

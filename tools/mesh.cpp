@@ -19,20 +19,22 @@ void run(const MeshArgs& args, const Console& console) {
                         ": not a mesh format; use .obj, .ply, .stl, .off, .glb or .drc");
     args.surface.check(args.out);
     console.may_write(args.out, {args.solid.path});
-    const Solid solid = read_solid(args.solid, console);
-    const std::string recipe = format_recipe(solid.node, solid.measure.voxel_m, 0);
-    console.result(write_solid(args.out, *solid.grid, recipe, args.surface, console));
+    const Solid solid = read_solid(args.solid, console, Surfaces::wanted);
+    const std::string recipe = format_recipe(solid.node, solid.measure.voxel_m, 0,
+                                             args.surface.lod(args.out, solid.measure));
+    console.result(write_solid(args.out, *solid.grid, solid.field.get(), recipe,
+                               args.surface.settings(solid.measure), console));
 }
 
 } // namespace
 
 void add_mesh(CLI::App& app, Console& console) {
     auto args = std::make_shared<MeshArgs>();
-    auto* verb = console.verb(
-        app, "mesh", "Turn a solid into a closed mesh, adaptive within an error or uniform",
-        "  taihu mesh rock.vdb -o rock.obj\n"
-        "  taihu mesh rock.vdb --max-error 2mm -o rock.glb\n"
-        "  taihu mesh rock.vdb --uniform -o rock.stl");
+    auto* verb = console.verb(app, "mesh",
+                              "Turn a solid into a closed mesh, sharp and adaptive within an error",
+                              "  taihu mesh rock.vdb -o rock.obj\n"
+                              "  taihu mesh rock.vdb --max-error 2mm -o rock.glb\n"
+                              "  taihu mesh rock.vdb --uniform -o rock.stl");
     verb->add_option("solid", args->solid.path, "Level set to mesh (.vdb, or a mesh to remesh)")
         ->required();
     verb->add_option("-o,--output", args->out, "Where to write it (.obj .ply .stl .off .glb .drc)")

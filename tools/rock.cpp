@@ -1,12 +1,13 @@
 // taihu rock: a whole recipe, made.
-#include "mesh_out/lod.h"
 #include "stats/core/error.h"
 #include "stats/core/file.h"
 #include "stats/core/text.h"
 #include "stats/io/holes_file.h"
+#include "tools/level_files.h"
 #include "tools/presets.h"
 #include "tools/solid_files.h"
 #include "tools/tile_files.h"
+#include "vdb_ops/level_set_box.h"
 #include "vdb_ops/recipe_solid.h"
 #include "vdb_ops/vdb_file.h"
 
@@ -118,26 +119,6 @@ void estimate(const Source& source, const RecipeAssets& assets, const RecipeSett
                     {"fits", bytes <= e.limit_bytes}});
 }
 
-nlohmann::ordered_json write_levels(const RockArgs& args, const RecipeSolid& made,
-                                    const Console& console) {
-    LodSettings settings;
-    settings.n_levels = made.lod->n_levels;
-    settings.bound_m = made.lod->bound_m;
-    settings.factor = made.lod->factor;
-    const LodChain chain = make_lods(*made.solid, settings, console.progress);
-    const std::string report = format_report(chain, base_name(args.out));
-    write_file(args.out, format_glb(chain, {.recipe = made.recipe}));
-    for (std::size_t j = 0; j < chain.levels.size(); ++j)
-        console.say("{}: level {}: {} triangles, {} bytes, error {:.3g} m", args.out.string(), j,
-                    chain.levels[j].certificate.n_triangles, chain.levels[j].encoded.draco.size(),
-                    chain.levels[j].error_m);
-    if (!args.report.empty()) {
-        write_file(args.report, report);
-        console.say("{}: the figures of each level", args.report.string());
-    }
-    return nlohmann::ordered_json::parse(report);
-}
-
 void write_holes(const RockArgs& args, const std::vector<Sphere>& holes, const std::string& where,
                  const Console& console) {
     if (args.holes.empty())
@@ -152,9 +133,9 @@ void check_output(const RockArgs& args, const Console& console) {
     if (args.out.empty() && !args.dry_run)
         throw Error(Fault::bad_argument,
                     "rock: say where to write it, as -o rock.glb, or --dry-run");
-    if (args.tiles.tiles && (args.surface.any() || !args.report.empty()))
-        throw Error(Fault::bad_argument, "--tiles: are level sets; drop --max-error, --uniform, "
-                                         "--no-draco and --report");
+    const auto option = args.report.empty() ? args.surface.any() : "--report";
+    if (args.tiles.tiles && option)
+        throw Error(Fault::bad_argument, "--tiles: are level sets; drop " + *option);
     if (!args.out.empty() && args.tiles.tiles) {
         console.may_write_tiles(args.out);
     } else if (!args.out.empty()) {
@@ -166,17 +147,30 @@ void check_output(const RockArgs& args, const Console& console) {
         console.may_write(args.holes, {args.recipe, args.from, args.out});
 }
 
+/// As the recipe's `lod` says unless an option does.
+nlohmann::ordered_json write_rock(const RockArgs& args, const RecipeSolid& made,
+                                  const Console& console) {
+    const bool by_recipe = made.lod && !args.surface.any() && !is_vdb(args.out);
+    if (by_recipe && !made.lod->uniform() && mesh_format(args.out) == MeshFormat::glb) {
+        LevelFiles files{.out = args.out, .report = args.report};
+        return write_levels(files, *made.solid, made.field.get(), *made.lod, made.recipe, console);
+    }
+    if (!args.report.empty())
+        throw Error(Fault::bad_argument, "--report: is of levels of detail; write a .glb of a "
+                                         "recipe that has 'lod'");
+    const Measure measure{made.voxel_m, level_set_box(*made.solid).longest()};
+    return write_solid(args.out, *made.solid, made.field.get(), made.recipe,
+                       by_recipe ? surface_settings(*made.lod) : args.surface.settings(measure),
+                       console);
+}
+
 void run(const RockArgs& args, const Console& console) {
     if (args.list)
         return list_presets(console);
     check_output(args, console);
     Source source = source_of(args, console);
     change(source, args);
-    const RecipeAssets assets{
-        source.folders, [&](const std::filesystem::path& file, double unit_m, bool z_up) {
-            return read_mesh(file, {unit_m, z_up ? UpAxis::z : UpAxis::y}, console.progress)
-                .levels.front();
-        }};
+    const RecipeAssets assets = recipe_assets(source.folders, console);
     if (args.dry_run)
         return estimate(source, assets, recipe_settings(args), console);
     if (args.tiles.tiles) {
@@ -191,12 +185,7 @@ void run(const RockArgs& args, const Console& console) {
         make_recipe(source.text, source.where, assets, recipe_settings(args), console.progress);
     console.say_all(args.out.string(), made.found);
     write_holes(args, made.holes, source.where, console);
-    const bool levels = made.lod && mesh_format(args.out) == MeshFormat::glb;
-    if (!levels && !args.report.empty())
-        throw Error(Fault::bad_argument, "--report: is of levels of detail; write a .glb of a "
-                                         "recipe that has 'lod'");
-    console.result(levels ? write_levels(args, made, console)
-                          : write_solid(args.out, *made.solid, made.recipe, args.surface, console));
+    console.result(write_rock(args, made, console));
 }
 
 } // namespace

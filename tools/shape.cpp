@@ -181,7 +181,7 @@ void run(ShapeArgs& args, const CLI::App& verb, const Console& console) {
                            limit);
         report_stage(console.progress, "rasterizing");
         const auto grid = rasterize(*field, lattice, console.progress);
-        json.update(write_solid(args.out, *grid,
+        json.update(write_solid(args.out, *grid, nullptr,
                                 format_recipe(node, lattice.voxel_m, args.settings.seed), {},
                                 console));
     } else {

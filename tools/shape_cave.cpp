@@ -27,7 +27,9 @@ nlohmann::ordered_json make_cave(const CaveSettings& settings, const std::filesy
     const CaveReport report = measure_cave(*made.solid, settings.size_m, console.progress);
     const Certificate surface =
         certify(extract_uniform(*made.solid, console.progress), {.self_intersections = false});
-    nlohmann::ordered_json json = write_solid(out, *made.solid, made.recipe, {}, console);
+    nlohmann::ordered_json json =
+        write_solid(out, *made.solid, made.field.get(), made.recipe,
+                    SurfaceOptions().settings({made.voxel_m, 0}), console);
     json["kind"] = "cave";
     json["rocks"] = settings.n_rocks;
     json["voids"] = report.n_voids;

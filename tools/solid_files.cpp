@@ -27,6 +27,34 @@ std::string lower_extension(const std::filesystem::path& path) {
     return extension;
 }
 
+bool same_level_set(const openvdb::FloatGrid& a, const openvdb::FloatGrid& b) {
+    if (!a.tree().hasSameTopology(b.tree()) || a.transform() != b.transform())
+        return false;
+    for (auto one = a.cbeginValueAll(), other = b.cbeginValueAll(); one; ++one, ++other)
+        if (*one != *other)
+            return false;
+    return true;
+}
+
+/// Of a level set that its recipe makes again, from the files beside it; null when it does not.
+std::shared_ptr<const Field> field_of(const openvdb::FloatGrid& grid, const std::string& recipe,
+                                      const std::filesystem::path& path, const Console& console) {
+    std::string why = "its recipe makes another solid with this version";
+    try {
+        const std::filesystem::path folder = path.has_parent_path() ? path.parent_path() : ".";
+        const RecipeSolid again = make_recipe(
+            recipe, base_name(path), recipe_assets({folder}, console), {}, console.progress);
+        if (same_level_set(grid, *again.solid))
+            return again.field;
+    } catch (const Error& e) {
+        if (e.fault() == Fault::cancelled)
+            throw;
+        why = e.what();
+    }
+    console.say("{}: surface from its voxels alone, rims not sharp: {}", path.string(), why);
+    return nullptr;
+}
+
 } // namespace
 
 bool is_vdb(const std::filesystem::path& path) {
@@ -77,7 +105,15 @@ MeshReadSettings SolidOptions::mesh_settings() const {
     return {unit_m.value_or(1), z_up() ? UpAxis::z : UpAxis::y};
 }
 
-Solid read_solid(const SolidOptions& options, const Console& console) {
+RecipeAssets recipe_assets(std::vector<std::filesystem::path> folders, const Console& console) {
+    return {std::move(folders),
+            [&console](const std::filesystem::path& file, double unit_m, bool z_up) {
+                return read_mesh(file, {unit_m, z_up ? UpAxis::z : UpAxis::y}, console.progress)
+                    .levels.front();
+            }};
+}
+
+Solid read_solid(const SolidOptions& options, const Console& console, Surfaces surfaces) {
     Solid solid;
     const std::string name = base_name(options.path), where = options.path.string();
     if (is_vdb(options.path)) {
@@ -88,6 +124,8 @@ Solid read_solid(const SolidOptions& options, const Console& console) {
                             "--close, --shells, --unit and --up, or voxelize the mesh again");
         VdbFile file = read_solid_vdb(options.path);
         solid.grid = file.solid;
+        if (surfaces == Surfaces::wanted && recipe_solid(file.recipe))
+            solid.field = field_of(*file.solid, file.recipe, options.path, console);
         const auto made = recipe_solid(file.recipe);
         solid.node = made ? *made : level_set_node(name, sha256_hex(read_file(options.path)));
     } else {
@@ -102,6 +140,7 @@ Solid read_solid(const SolidOptions& options, const Console& console) {
         report_stage(console.progress, "voxelizing");
         VoxelizeResult result = voxelize(mesh, where, settings, console.progress);
         solid.grid = result.solid;
+        solid.field = result.field;
         solid.found = result.diagnosis.lines(settings.voxel_m);
         if (file.n_polygons > 0)
             solid.found.push_back(
@@ -120,29 +159,102 @@ Solid read_solid(const SolidOptions& options, const Console& console) {
 }
 
 void SurfaceOptions::add_options(CLI::App& verb) {
-    auto* bound =
-        verb.add_option("--max-error", max_error,
-                        "A mesh: no point farther than this from the uniform surface [0.5vox]");
-    verb.add_flag("--uniform", uniform, "A mesh: the plain extraction, two triangles a voxel")
-        ->excludes(bound);
+    auto* bound = verb.add_option(
+        "--max-error", max_error,
+        "A mesh: no point of it or of the solid's surface farther from the other [0.5vox]");
+    auto* count = verb.add_option("--triangles", triangles,
+                                  "A mesh: or as many as this, within 2 %, at the least error")
+                      ->check(CLI::Range(4.0, 1e9))
+                      ->excludes(bound);
+    auto* how = verb.add_option("--method", method,
+                                "A mesh: field, sharp and adaptive, or openvdb, its mesher [field]")
+                    ->check(CLI::IsMember({"field", "openvdb"}))
+                    ->excludes(bound)
+                    ->excludes(count);
+    auto* plain =
+        verb.add_flag("--uniform", uniform, "A mesh: that of openvdb, two triangles a voxel")
+            ->excludes(bound)
+            ->excludes(count)
+            ->excludes(how);
+    verb.add_option("--adaptivity", adaptivity,
+                    "with --method openvdb: larger polygons where it is flatter, 0..1 [0]")
+        ->check(CLI::Range(0.0, 1.0))
+        ->excludes(plain);
     verb.add_flag("--no-draco", no_draco, "A GLB: without Draco compression");
+    verb.add_flag("--no-ao", no_ao, "A GLB: without ambient occlusion in its vertex colours");
+    verb.add_option("--origin", origin,
+                    "A mesh: world, or foot, the middle of the box's underside [world]")
+        ->check(CLI::IsMember({"world", "foot"}));
+}
+
+std::optional<std::string> SurfaceOptions::any() const {
+    const std::pair<bool, const char*> given[] = {{max_error.has_value(), "--max-error"},
+                                                  {triangles.has_value(), "--triangles"},
+                                                  {method.has_value(), "--method"},
+                                                  {uniform, "--uniform"},
+                                                  {adaptivity.has_value(), "--adaptivity"},
+                                                  {no_draco, "--no-draco"},
+                                                  {no_ao, "--no-ao"},
+                                                  {origin.has_value(), "--origin"}};
+    for (const auto& [is_given, name] : given)
+        if (is_given)
+            return name;
+    return std::nullopt;
 }
 
 void SurfaceOptions::check(const std::filesystem::path& out) const {
-    if (is_vdb(out) && (uniform || no_draco || max_error))
-        throw Error(Fault::bad_argument, out.string() +
-                                             ": a level set has no triangles; drop --max-error, "
-                                             "--uniform and --no-draco");
-    if (no_draco && mesh_format(out) != MeshFormat::glb)
-        throw Error(Fault::bad_argument,
-                    out.string() + ": only a .glb is Draco-compressed; drop --no-draco");
+    const auto refuse = [&](const std::string& why) {
+        throw Error(Fault::bad_argument, out.string() + ": " + why);
+    };
+    if (const auto option = any(); option && is_vdb(out))
+        refuse("a level set has no triangles; drop " + *option);
+    const bool glb = mesh_format(out) == MeshFormat::glb;
+    if (no_draco && !glb)
+        refuse("only a .glb is Draco-compressed; drop --no-draco");
+    if (no_ao && !glb)
+        refuse("only a .glb has vertex colours; drop --no-ao");
+    if (adaptivity && method != "openvdb")
+        refuse("--adaptivity is of OpenVDB's mesher; add --method openvdb");
 }
 
 SurfaceSettings SurfaceOptions::settings(const Measure& measure) const {
     SurfaceSettings s;
-    s.uniform = uniform;
+    s.uniform = uniform || method == "openvdb";
+    s.adaptivity = adaptivity.value_or(0);
     s.draco = !no_draco;
-    s.max_error_m = length_m("--max-error", max_error.value_or(kDefaultMaxError), measure);
+    s.openness = !no_ao;
+    s.at_foot = origin == "foot";
+    if (triangles)
+        s.n_triangles = *triangles;
+    else if (!s.uniform)
+        s.max_error_m = length_m("--max-error", max_error.value_or(kDefaultMaxError), measure);
+    return s;
+}
+
+std::optional<RecipeLod> SurfaceOptions::lod(const std::filesystem::path& out,
+                                             const Measure& measure) const {
+    if (is_vdb(out) || adaptivity.value_or(0) > 0)
+        return std::nullopt;
+    const SurfaceSettings s = settings(measure);
+    RecipeLod lod;
+    if (s.n_triangles > 0)
+        lod.triangles = {s.n_triangles};
+    else if (!s.uniform)
+        lod.bounds_m = {s.max_error_m};
+    lod.openness = s.openness;
+    lod.at_foot = s.at_foot;
+    return lod;
+}
+
+SurfaceSettings surface_settings(const RecipeLod& lod) {
+    SurfaceSettings s;
+    s.uniform = lod.uniform();
+    if (!lod.bounds_m.empty())
+        s.max_error_m = lod.bounds_m.front();
+    else if (!s.uniform)
+        s.n_triangles = lod.triangles.front();
+    s.openness = lod.openness;
+    s.at_foot = lod.at_foot;
     return s;
 }
 
@@ -181,9 +293,18 @@ std::string certificate_line(const Certificate& c) {
                        c.volume_m3, some(c.n_self_intersections, "self-intersection"));
 }
 
+void say_unresolved(const std::string& where, std::size_t n, double error_m,
+                    const Console& console) {
+    if (n > 0)
+        console.say("{}: but in {} place{} with walls or slits thinner than a voxel, {:.3g} m off "
+                    "at most",
+                    where, n, n == 1 ? "" : "s", error_m);
+}
+
 nlohmann::ordered_json write_solid(const std::filesystem::path& path,
-                                   const openvdb::FloatGrid& grid, const std::string& recipe,
-                                   const SurfaceOptions& surface, const Console& console) {
+                                   const openvdb::FloatGrid& grid, const Field* field,
+                                   const std::string& recipe, const SurfaceSettings& surface,
+                                   const Console& console) {
     console.may_write(path);
     const Measure measure{lattice_of(grid).voxel_m, longest_m(grid)};
     nlohmann::ordered_json json = {{"file", path.string()}};
@@ -194,16 +315,19 @@ nlohmann::ordered_json write_solid(const std::filesystem::path& path,
         console.say("{}: level set, voxel {:.4g} m, {} leaves", path.string(), measure.voxel_m,
                     static_cast<std::size_t>(grid.tree().leafCount()));
     } else {
-        const SurfaceFile file = format_surface(grid, *mesh_format(path), surface.settings(measure),
-                                                recipe, console.progress);
+        const SurfaceFile file =
+            format_surface(grid, field, *mesh_format(path), surface, recipe, console.progress);
         write_file(path, file.bytes);
         json["bytes"] = file.bytes.size();
         json["bound_m"] = file.bound_m;
         json["error_m"] = file.error_m;
+        json["unresolved"] = file.n_unresolved;
         json["certificate"] = certificate_json(file.certificate);
         console.say("{}: {}", path.string(), certificate_line(file.certificate));
-        console.say("{}: within {:.3g} m of the uniform surface (bound {:.3g} m), {} bytes",
-                    path.string(), file.error_m, file.bound_m, file.bytes.size());
+        console.say("{}: within {:.3g} m of the {} (bound {:.3g} m), {} bytes", path.string(),
+                    file.error_m, surface.uniform ? "uniform surface" : "solid's surface",
+                    file.bound_m, file.bytes.size());
+        say_unresolved(path.string(), file.n_unresolved, file.unresolved_error_m, console);
     }
     return json;
 }

@@ -1,6 +1,7 @@
 #pragma once
 #include <cstdint>
 #include <filesystem>
+#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
@@ -8,11 +9,13 @@
 #include <openvdb/openvdb.h>
 
 #include "mesh_out/io/mesh_file.h"
-#include "mesh_out/lod.h"
 #include "mesh_out/surface_file.h"
 #include "tools/console.h"
 #include "tools/units.h"
+#include "vdb_ops/field.h"
 #include "vdb_ops/mesh_diagnosis.h"
+#include "vdb_ops/recipe.h"
+#include "vdb_ops/recipe_solid.h"
 
 namespace taihu {
 
@@ -36,33 +39,57 @@ struct SolidOptions {
 
 struct Solid {
     openvdb::FloatGrid::Ptr grid;
-    Measure measure;                ///< its voxel, its longest axis
-    std::string node;               ///< its place in a recipe
-    std::vector<std::string> found; ///< what was repaired in a mesh
+    std::shared_ptr<const Field> field; ///< what its surface is made of, or null
+    Measure measure;                    ///< its voxel, its longest axis
+    std::string node;                   ///< its place in a recipe
+    std::vector<std::string> found;     ///< what was repaired in a mesh
 };
 
 inline constexpr int kDefaultDim = 256;
 inline constexpr const char* kDefaultMaxError = "0.5vox";
 
-/// A .vdb as it is, or a mesh voxelized. Findings are said on the console.
-Solid read_solid(const SolidOptions& options, const Console& console);
+/// Whether a surface is made of the solid, which is sharper with its field.
+enum class Surfaces { none, wanted };
+
+/// A .vdb as it is, or a mesh voxelized. Findings are said on the console. Where surfaces are
+/// wanted, a .vdb with a recipe is made again by that, and if that gives the same level set, its
+/// field is the solid's.
+Solid read_solid(const SolidOptions& options, const Console& console,
+                 Surfaces surfaces = Surfaces::none);
+
+/// Files of a recipe, and how its meshes are read.
+RecipeAssets recipe_assets(std::vector<std::filesystem::path> folders, const Console& console);
 
 /// How a surface is written where `-o` names a mesh format.
 struct SurfaceOptions {
-    bool uniform = false, no_draco = false;
-    std::optional<std::string> max_error;
+    bool uniform = false, no_draco = false, no_ao = false;
+    std::optional<std::string> max_error, method, origin;
+    std::optional<double> adaptivity;
+    std::optional<std::uint64_t> triangles;
     void add_options(CLI::App& verb);
-    bool any() const { return uniform || no_draco || max_error; }
+    /// The name of one that was given, or nothing.
+    std::optional<std::string> any() const;
     /// \throws Error bad_argument: an option that has no meaning for this output.
     void check(const std::filesystem::path& out) const;
     SurfaceSettings settings(const Measure& measure) const;
+    /// What a recipe says of them; nothing where the output is a level set.
+    std::optional<RecipeLod> lod(const std::filesystem::path& out, const Measure& measure) const;
 };
+
+/// The settings by which a single mesh is written as a recipe says.
+SurfaceSettings surface_settings(const RecipeLod& lod);
 
 /// Write a solid as the extension of `path` says: .vdb, or a certified mesh. Returns the keys of
 /// the verb's JSON result: file, bytes, and for a mesh its certificate.
+/// \param field  what its surface is made of, or null.
 nlohmann::ordered_json write_solid(const std::filesystem::path& path,
-                                   const openvdb::FloatGrid& grid, const std::string& recipe,
-                                   const SurfaceOptions& surface, const Console& console);
+                                   const openvdb::FloatGrid& grid, const Field* field,
+                                   const std::string& recipe, const SurfaceSettings& surface,
+                                   const Console& console);
+
+/// Where a bound is not promised; nothing when that is nowhere.
+void say_unresolved(const std::string& where, std::size_t n, double error_m,
+                    const Console& console);
 
 nlohmann::ordered_json certificate_json(const Certificate& certificate);
 /// `closed 2-manifold, outward: 1 piece, genus 12, 0.41 m^3, 0 self-intersections`.

@@ -19,7 +19,7 @@ void run(const VoxelizeArgs& args, const Console& console) {
     console.may_write(args.out, {args.mesh.path});
     const Solid solid = read_solid(args.mesh, console);
     const std::string recipe = format_recipe(solid.node, solid.measure.voxel_m, 0);
-    auto json = write_solid(args.out, *solid.grid, recipe, {}, console);
+    auto json = write_solid(args.out, *solid.grid, nullptr, recipe, {}, console);
     json["voxel_m"] = solid.measure.voxel_m;
     json["volume_m3"] = volume_m3(*solid.grid);
     json["found"] = solid.found;

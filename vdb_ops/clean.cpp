@@ -4,9 +4,11 @@
 
 #include "stats/core/error.h"
 #include "stats/number_detail.h"
+#include "vdb_ops/combine_field.h"
 #include "vdb_ops/flips_detail.h"
 #include "vdb_ops/necks_detail.h"
 #include "vdb_ops/rasterize.h"
+#include "vdb_ops/solids_field.h"
 #include "vdb_ops/volume.h"
 
 namespace taihu {
@@ -46,6 +48,19 @@ void check_clean_settings(const CleanSettings& settings) {
     if (!(settings.foot_deg >= 0 && settings.foot_deg <= 60))
         throw Error(Fault::bad_argument,
                     "clean: foot_deg is " + shortest(settings.foot_deg) + ", must be 0..60");
+}
+
+std::shared_ptr<const Field> cleaned_field(std::shared_ptr<const Field> field,
+                                           const CleanCounts& counts) {
+    if (!field || counts.n_necked > 0)
+        return nullptr;
+    if (!counts.foot || counts.foot->cut_m == 0)
+        return field;
+    auto below = std::make_shared<SolidsField>(std::vector<AnalyticSolid>{
+        {HalfSpaceSolid{}, Similarity::translation({0, counts.foot->y_m, 0})}});
+    return std::make_shared<CombineField>(
+        Combine::subtract,
+        std::vector<std::shared_ptr<const Field>>{std::move(field), std::move(below)});
 }
 
 namespace {

@@ -1,5 +1,6 @@
 #pragma once
 #include <cstddef>
+#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
@@ -7,6 +8,7 @@
 #include <openvdb/openvdb.h>
 
 #include "stats/core/progress.h"
+#include "vdb_ops/field.h"
 #include "vdb_ops/foot.h"
 
 namespace taihu {
@@ -39,6 +41,12 @@ struct CleanCounts {
 
 /// \throws Error bad_argument: a setting out of range.
 void check_clean_settings(const CleanSettings& settings);
+
+/// The field of what clean() made of a solid: cut flat where that was. Pieces removed and bubbles
+/// filled are still in it. Null, as when `field` is, where necks were cut: no field has that
+/// surface.
+std::shared_ptr<const Field> cleaned_field(std::shared_ptr<const Field> field,
+                                           const CleanCounts& counts);
 
 /// What it stands on, for people; of counts that have a foot.
 std::string foot_line(const CleanCounts& counts);

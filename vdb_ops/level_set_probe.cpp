@@ -1,3 +1,4 @@
+#include <algorithm>
 #include <array>
 #include <cmath>
 
@@ -68,7 +69,8 @@ std::unique_ptr<FieldProbe> LevelSetField::probe(const Box&, double) const {
 std::unique_ptr<FieldProbe> PlacedLevelSetField::probe(const Box&, double reach_m) const {
     const Lattice own = lattice_of(*grid_);
     // The eight voxels around a point are within sqrt(3) of it.
-    const double half_width = reach_m / at_.scale() / own.voxel_m + 1.74;
+    constexpr double kWidest_vox = 16;
+    const double half_width = std::min(reach_m / at_.scale() / own.voxel_m + 1.74, kWidest_vox);
     auto grid = half_width > static_cast<double>(own.half_width_vox)
                     ? widen_band(*grid_, static_cast<float>(half_width))
                     : grid_;

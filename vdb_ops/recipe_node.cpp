@@ -12,6 +12,7 @@
 #include "vdb_ops/csg_field.h"
 #include "vdb_ops/level_set_box.h"
 #include "vdb_ops/level_set_field.h"
+#include "vdb_ops/mesh_field.h"
 #include "vdb_ops/mesh_solid.h"
 #include "vdb_ops/offset_field.h"
 #include "vdb_ops/place.h"
@@ -36,6 +37,13 @@ Box grown(const Box& box, double by_m) {
     out.include(box.lo - Vec3{by_m, by_m, by_m});
     out.include(box.hi + Vec3{by_m, by_m, by_m});
     return out;
+}
+
+/// To build on: of a level set between its voxels where it has no other.
+std::shared_ptr<const Field> base_field(const NodeSolid& solid) {
+    if (solid.field)
+        return solid.field;
+    return std::make_shared<PlacedLevelSetField>(solid.grid);
 }
 
 /// The lattice giver of the first of `nodes` that has one.
@@ -112,10 +120,10 @@ public:
     std::shared_ptr<const Field> field(const RecipeScene&, const Similarity& at) const override {
         return std::make_shared<PlacedLevelSetField>(grid_, at);
     }
-    openvdb::FloatGrid::Ptr grid(const RecipeScene& scene, const Similarity& at) const override {
+    NodeSolid solid(const RecipeScene& scene, const Similarity& at) const override {
         if (at.is_identity() && same_lattice(*grid_, scene.lattice))
-            return grid_;
-        return RecipeNode::grid(scene, at);
+            return {grid_, nullptr};
+        return RecipeNode::solid(scene, at);
     }
     std::shared_ptr<const Field> tile_field(const RecipeScene& scene,
                                             const Similarity& at) const override {
@@ -234,18 +242,24 @@ public:
         return std::make_shared<CombineField>(Combine::subtract, std::move(fields),
                                               blend_m_ * at.scale());
     }
-    openvdb::FloatGrid::Ptr grid(const RecipeScene& scene, const Similarity& at) const override {
+    NodeSolid solid(const RecipeScene& scene, const Similarity& at) const override {
         if (blend_m_ > 0)
-            return RecipeNode::grid(scene, at);
-        const openvdb::FloatGrid::Ptr base = of_.front()->grid(scene, at);
-        const std::vector<Sphere> holes = spheres(scene, at, base);
-        openvdb::FloatGrid::Ptr rock = carve(*base, holes, scene.progress).rock;
-        std::vector<std::shared_ptr<const Field>> fields = {std::make_shared<LevelSetField>(rock)};
-        add_others(scene, at, fields);
-        if (fields.size() == 1)
+            return RecipeNode::solid(scene, at);
+        const NodeSolid base = of_.front()->solid(scene, at);
+        std::vector<Sphere> holes = spheres(scene, at, base.grid);
+        NodeSolid rock{carve(*base.grid, holes, scene.progress).rock, nullptr};
+        std::vector<std::shared_ptr<const Field>> others;
+        add_others(scene, at, others);
+        std::vector<std::shared_ptr<const Field>> parts = {base_field(base),
+                                                           std::make_shared<BallsField>(holes)};
+        parts.insert(parts.end(), others.begin(), others.end());
+        rock.field = std::make_shared<CombineField>(Combine::subtract, std::move(parts));
+        if (others.empty())
             return rock;
-        return rasterize(CombineField(Combine::subtract, std::move(fields)), scene.lattice,
-                         scene.progress);
+        others.insert(others.begin(), std::make_shared<LevelSetField>(rock.grid));
+        rock.grid = rasterize(CombineField(Combine::subtract, std::move(others)), scene.lattice,
+                              scene.progress);
+        return rock;
     }
     std::shared_ptr<const Field> tile_field(const RecipeScene& scene,
                                             const Similarity& at) const override {
@@ -278,7 +292,7 @@ private:
             if (!holes)
                 continue;
             if (holes->needs_solid() && !base)
-                base = of_.front()->grid(own, {});
+                base = of_.front()->solid(own, {}).grid;
             const auto some =
                 holes->needs_solid() ? holes->spheres_in(*base, own, at) : holes->spheres(at);
             all.insert(all.end(), some.begin(), some.end());
@@ -310,8 +324,8 @@ public:
                                        const Similarity& at) const override {
         return of_->field(scene, at * by_);
     }
-    openvdb::FloatGrid::Ptr grid(const RecipeScene& scene, const Similarity& at) const override {
-        return of_->grid(scene, at * by_);
+    NodeSolid solid(const RecipeScene& scene, const Similarity& at) const override {
+        return of_->solid(scene, at * by_);
     }
     std::shared_ptr<const Field> tile_field(const RecipeScene& scene,
                                             const Similarity& at) const override {
@@ -399,19 +413,19 @@ public:
     Box box(const Similarity& at) const override { return of_->box(at); }
     std::shared_ptr<const Field> field(const RecipeScene& scene,
                                        const Similarity& at) const override {
-        return std::make_shared<PlacedLevelSetField>(grid(scene, at), Similarity());
+        return std::make_shared<PlacedLevelSetField>(solid(scene, at).grid, Similarity());
     }
-    openvdb::FloatGrid::Ptr grid(const RecipeScene& scene, const Similarity& at) const override {
-        const auto of = of_->grid(scene, at);
+    NodeSolid solid(const RecipeScene& scene, const Similarity& at) const override {
+        const NodeSolid of = of_->solid(scene, at);
         report_stage(scene.progress, "cleaning");
-        const CleanResult result = clean(*of, settings(at), scene.progress);
+        const CleanResult result = clean(*of.grid, settings(at), scene.progress);
         for (const std::string& line : cleaning_lines(result))
             scene.found.push_back(where_ + ": " + line);
-        return result.solid;
+        return {result.solid, cleaned_field(of.field, result)};
     }
     std::shared_ptr<const Field> tile_field(const RecipeScene& scene,
                                             const Similarity& at) const override {
-        return std::make_shared<LevelSetField>(grid(scene, at));
+        return std::make_shared<LevelSetField>(solid(scene, at).grid);
     }
     std::optional<RecipeCleaning> cleaning() const override {
         return RecipeCleaning{of_.get(), settings_, {}};
@@ -431,8 +445,10 @@ private:
 
 } // namespace
 
-openvdb::FloatGrid::Ptr RecipeNode::grid(const RecipeScene& scene, const Similarity& at) const {
-    return rasterize(*field(scene, at), scene.lattice, scene.progress);
+NodeSolid RecipeNode::solid(const RecipeScene& scene, const Similarity& at) const {
+    const auto own = field(scene, at);
+    const openvdb::FloatGrid::Ptr grid = rasterize(*own, scene.lattice, scene.progress);
+    return {grid, surface_field(own, grid)};
 }
 
 std::shared_ptr<const Field> RecipeNode::tile_field(const RecipeScene& scene,

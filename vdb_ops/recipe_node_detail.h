@@ -29,6 +29,12 @@ struct RecipeScene {
     Progress* progress = nullptr;
 };
 
+/// A solid as a level set, and what its surface is made of: null where nothing but that says.
+struct NodeSolid {
+    openvdb::FloatGrid::Ptr grid;
+    std::shared_ptr<const Field> field;
+};
+
 class RecipeNode;
 
 /// What a node that cleans does: to which solid, put where.
@@ -47,9 +53,9 @@ public:
     virtual Box box(const Similarity& at) const = 0;
     virtual std::shared_ptr<const Field> field(const RecipeScene& scene,
                                                const Similarity& at) const = 0;
-    /// The level set on the scene's lattice; that of field() unless a node needs one anyway.
-    virtual openvdb::FloatGrid::Ptr grid(const RecipeScene& scene, const Similarity& at) const;
-    /// A field that rasterizes to grid(), bit for bit, in any part of space alone.
+    /// With the level set on the scene's lattice; that of field() unless a node needs one anyway.
+    virtual NodeSolid solid(const RecipeScene& scene, const Similarity& at) const;
+    /// A field that rasterizes to the grid of solid(), bit for bit, in any part of space alone.
     virtual std::shared_ptr<const Field> tile_field(const RecipeScene& scene,
                                                     const Similarity& at) const;
     /// Of a node that cleans, so that others may do it; nothing for the rest.

@@ -245,7 +245,10 @@ RecipeSolid make_recipe(const std::string& recipe, const std::string& where,
     const double limit = memory_limit_bytes(settings.memory_bytes);
     if (may_exceed(ready.box, made.voxel_m, least, limit))
         refuse_if_over(memory_of(ready, settings, progress).memory, made.voxel_m, limit);
-    made.solid = ready.root->grid({ready.lattice, made.found, made.holes, progress}, ready.at);
+    NodeSolid solid =
+        ready.root->solid({ready.lattice, made.found, made.holes, progress}, ready.at);
+    made.solid = std::move(solid.grid);
+    made.field = std::move(solid.field);
     return made;
 }
 

@@ -2,6 +2,7 @@
 #include <cstdint>
 #include <filesystem>
 #include <functional>
+#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
@@ -12,6 +13,7 @@
 #include "stats/core/sphere.h"
 #include "stats/core/tri_mesh.h"
 #include "vdb_ops/estimate.h"
+#include "vdb_ops/field.h"
 #include "vdb_ops/recipe.h"
 #include "vdb_ops/tiles.h"
 
@@ -46,6 +48,9 @@ struct RecipeReport {
 
 struct RecipeSolid : RecipeReport {
     openvdb::FloatGrid::Ptr solid;
+    /// What its surface is made of, but for pieces removed and bubbles filled; null where only the
+    /// level set says.
+    std::shared_ptr<const Field> field;
 };
 
 struct RecipeTiles : RecipeReport {

@@ -5,6 +5,7 @@
 #include <fstream>
 
 #include "stats/core/error.h"
+#include "vdb_ops/mesh_field.h"
 #include "vdb_ops/mesh_solid.h"
 #include "vdb_ops/rasterize.h"
 
@@ -94,6 +95,7 @@ VoxelizeResult voxelize(const TriMesh& mesh, const std::string& where,
     VoxelizeResult result;
     result.diagnosis = solid.diagnosis;
     result.solid = rasterize(*solid.field, lattice, progress);
+    result.field = surface_field(solid.field, result.solid);
     if (!any_inside(*result.solid))
         throw Error(Fault::bad_input, where + ": smaller than a voxel of " +
                                           std::to_string(settings.voxel_m) +

@@ -1,4 +1,5 @@
 #pragma once
+#include <memory>
 #include <string>
 
 #include <openvdb/openvdb.h>
@@ -6,6 +7,7 @@
 #include "stats/core/box.h"
 #include "stats/core/progress.h"
 #include "stats/core/tri_mesh.h"
+#include "vdb_ops/field.h"
 #include "vdb_ops/mesh_diagnosis.h"
 
 namespace taihu {
@@ -18,6 +20,7 @@ struct VoxelizeSettings {
 
 struct VoxelizeResult {
     openvdb::FloatGrid::Ptr solid; ///< narrow-band level set [m], negative inside
+    std::shared_ptr<const Field> field; ///< surface_field() of it
     MeshDiagnosis diagnosis;       ///< what was found and closed; lines() wants the voxel
 };
 
