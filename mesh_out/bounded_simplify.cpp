@@ -151,7 +151,10 @@ BoundedMesh BoundedSimplifier::to_triangles(std::size_t n, Progress* progress) {
     };
     double fine = bound_m_, coarse = 0;
     double bound = fine > 0 ? fine : kFirstBound * settings_.spacing_m;
-    for (int trial = 0; trial < kMostTrials; ++trial) {
+    Box box;
+    for (const Vec3& p : mesh_.positions)
+        box.include(p);
+    for (int trial = 0; trial < kMostTrials && bound < box.longest(); ++trial) {
         LabelledMesh collapsed;
         BoundedMesh out = level(bound, {}, collapsed, progress);
         const std::size_t count = out.mesh.triangles.size();
@@ -175,9 +178,10 @@ BoundedMesh BoundedSimplifier::to_triangles(std::size_t n, Progress* progress) {
         else
             bound = std::min(guess, 0.95 * coarse);
     }
-    throw Error(Fault::numeric, std::string(kWhere) + ": found no bound that leaves " +
-                                    std::to_string(n) + " triangles, the last was " +
-                                    rounded(bound) + " m; ask for another count");
+    throw Error(Fault::numeric,
+                std::string(kWhere) + ": " + std::to_string(n) +
+                    " triangles are too few for its rims and tunnels, there is nothing between " +
+                    std::to_string(mesh_.triangles.size()) + " and that; ask for more");
 }
 
 } // namespace taihu

@@ -75,7 +75,7 @@ private:
     double finest_bound_m() const;
     /// What rounding may take of a bound; a step as long as the mesh itself would help nobody.
     double max_move_m(double bound_m) const {
-        return std::min(kRoundingShare * bound_m, box_.longest() / 8);
+        return std::min(kRoundingShare * bound_m, box_.longest() / 16);
     }
     /// A level, and where it is not what it should be.
     struct Written {
@@ -87,7 +87,7 @@ private:
     Written written(const BoundedMesh& mesh, double bound_m) const;
     std::vector<Sphere> around(const std::vector<Vec3>& points, double radius_m) const;
     bool within(double bound_m, LodLevel& level);
-    LodLevel of_triangles(std::size_t n);
+    bool of_triangles(std::size_t n, LodLevel& level, std::string& why);
 
     const LodSettings& settings_;
     Progress* progress_;
@@ -139,11 +139,18 @@ TriMesh Chain::snapped(const BoundedMesh& mesh, double bound_m, PositionGrid& gr
                         surface_normals(mesh.mesh, *probe_)};
     for (double move_m = max_move_m(bound_m);; move_m /= 2) {
         check_cancelled(progress_);
-        grid = position_grid(box_.dilated(bound_m), move_m, origin_step_m_);
-        TriMesh out = snap_to_grid(plain, grid).mesh;
-        if (grid.bits == kMostBits || move_m < kLeastMove * max_move_m(bound_m) ||
-            count_crossings(out.positions, out.triangles) <= mesh.n_crossings)
-            return out;
+        // Balanced vertices lie off the surface.
+        grid =
+            position_grid(box_.dilated(std::min(bound_m, box_.longest())), move_m, origin_step_m_);
+        const bool finest = grid.bits == kMostBits || move_m < kLeastMove * max_move_m(bound_m);
+        try {
+            TriMesh out = snap_to_grid(plain, grid).mesh;
+            if (finest || count_crossings(out.positions, out.triangles) <= mesh.n_crossings)
+                return out;
+        } catch (const Error& e) { // vertices that find no place of their own
+            if (finest || e.fault() != Fault::numeric)
+                throw;
+        }
     }
 }
 
@@ -234,13 +241,22 @@ bool Chain::within(double bound_m, LodLevel& level) {
     }
 }
 
-/// A level of so many triangles, whatever its bound then is.
-LodLevel Chain::of_triangles(std::size_t n) {
-    const BoundedMesh mesh = last_->to_triangles(n, progress_);
+/// A level of so many triangles, whatever its bound then is. Returns false, and why, when there is
+/// none.
+bool Chain::of_triangles(std::size_t n, LodLevel& level, std::string& why) {
+    BoundedMesh mesh;
+    try {
+        mesh = last_->to_triangles(n, progress_);
+    } catch (const Error& e) {
+        if (e.fault() != Fault::numeric)
+            throw;
+        why = e.what();
+        return false;
+    }
     const double bound_m = mesh.bound_m / (1 - kRoundingShare);
-    LodLevel level = written(mesh, bound_m).level;
+    level = written(mesh, bound_m).level;
     level.bound_m = std::max(bound_m, level.error_m);
-    return level;
+    return true;
 }
 
 LodChain Chain::make() {
@@ -253,10 +269,17 @@ LodChain Chain::make() {
         const LodGoal& goal = settings_.levels[j];
         LodLevel level;
         bool made = true;
+        std::string why;
         if (goal.n_triangles > 0)
-            level = of_triangles(goal.n_triangles);
+            made = of_triangles(goal.n_triangles, level, why);
         else
             made = within(goal.bound_m, level);
+        if (!why.empty() && j > 0) {
+            chain.note = std::to_string(j) + " of " + std::to_string(n) + " levels: " + why;
+            break;
+        }
+        if (!why.empty())
+            throw Error(Fault::numeric, "lod: " + why);
         if (!made && j == 0)
             throw Error(Fault::numeric, "lod: the bound " + shown(level.bound_m) +
                                             " m cannot be met, the best mesh is " +
