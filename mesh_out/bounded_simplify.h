@@ -59,6 +59,9 @@ public:
     ///   size of the solid leads there; cancelled.
     BoundedMesh to_triangles(std::size_t n, Progress* progress = nullptr);
 
+    /// On the surface, of the last level, or as it came.
+    const LabelledMesh& surface() const { return mesh_; }
+
 private:
     LabelledMesh collapse(double bound_m, std::span<const std::uint8_t> frozen,
                           Progress* progress) const;

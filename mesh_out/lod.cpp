@@ -77,6 +77,8 @@ private:
     double max_move_m(double bound_m) const {
         return std::min(kRoundingShare * bound_m, box_.longest() / 16);
     }
+    /// From the last level, with probes for a level of this bound.
+    BoundedSimplifier simplifier(double bound_m);
     /// A level, and where it is not what it should be.
     struct Written {
         LodLevel level;
@@ -93,12 +95,13 @@ private:
     Progress* progress_;
     const double voxel_m_;
     std::unique_ptr<const Field> own_; ///< where none was given
-    LabelledMesh sharp_;
+    const Field* field_;
     TriMesh reference_;
     Box box_;
-    std::unique_ptr<const FieldProbe> probe_;
     double origin_step_m_ = 0;
-    std::optional<BoundedSimplifier> last_; ///< as the last level left it
+    LabelledMesh last_;                        ///< as the last level left it, on the surface
+    std::unique_ptr<const FieldProbe> probe_;  ///< as far as this level needs distances
+    std::unique_ptr<const FieldProbe> around_; ///< as far as its faces are long
 };
 
 /// The finest bound that is asked for; a fraction of a voxel where only triangles are.
@@ -109,11 +112,11 @@ double Chain::finest_bound_m() const {
 
 Chain::Chain(const openvdb::FloatGrid& solid, const Field* field, const LodSettings& settings,
              Progress* progress)
-    : settings_(settings), progress_(progress), voxel_m_(lattice_of(solid).voxel_m) {
+    : settings_(settings), progress_(progress), voxel_m_(lattice_of(solid).voxel_m), field_(field) {
     report_stage(progress, "extracting the surface");
     const double bound_vox = std::clamp(0.25 * finest_bound_m() / voxel_m_, 0.05, 0.5);
-    sharp_ = extract(solid, field, {.bound_vox = bound_vox}, progress);
-    reference_ = {sharp_.positions, sharp_.triangles, {}};
+    last_ = extract(solid, field, {.bound_vox = bound_vox}, progress);
+    reference_ = {last_.positions, last_.triangles, {}};
     box_ = bounds(reference_);
     origin_step_m_ = power_of_two_below(box_.longest() / 8);
     const double finest_m = finest_grid(box_).step_m * std::sqrt(3.0) / 2;
@@ -123,14 +126,17 @@ Chain::Chain(const openvdb::FloatGrid& solid, const Field* field, const LodSetti
                                         shown(finest_m / kRoundingShare * 1.001) + " m");
     if (!field) {
         own_ = std::make_unique<PlacedLevelSetField>(solid.copy()); // its band may be widened
-        field = own_.get();
+        field_ = own_.get();
     }
-    double largest_m = finest_bound_m();
-    for (const LodGoal& goal : settings.levels)
-        largest_m = std::max(largest_m, goal.n_triangles > 0 ? box_.longest() / 8 : goal.bound_m);
-    const double reach_m = 8 * (voxel_m_ + largest_m);
-    probe_ = field->probe(box_.dilated(reach_m), reach_m);
-    last_.emplace(sharp_, *probe_, BoundedSettings{.spacing_m = voxel_m_});
+}
+
+BoundedSimplifier Chain::simplifier(double bound_m) {
+    const auto probe = [&](double reach_m) {
+        return field_->probe(box_.dilated(reach_m), reach_m);
+    };
+    probe_ = probe(2 * (voxel_m_ + bound_m));
+    around_ = probe(8 * (voxel_m_ + bound_m));
+    return {last_, *around_, BoundedSettings{.spacing_m = voxel_m_}};
 }
 
 /// On the coarsest position grid of the chain on which no faces cross that did not before.
@@ -213,10 +219,11 @@ std::vector<Sphere> Chain::around(const std::vector<Vec3>& points, double radius
 /// what was there before stays. What no attempt mends is named. Returns false, and what was nearest
 /// to it in `level`, when that is nearly everywhere.
 bool Chain::within(double bound_m, LodLevel& level) {
+    const BoundedSimplifier start = simplifier(bound_m);
     double inner_m = bound_m - max_move_m(bound_m);
     std::vector<Sphere> kept;
     for (int attempt = 0;; ++attempt) {
-        BoundedSimplifier next = *last_;
+        BoundedSimplifier next = start;
         Written out = written(next.within(inner_m, kept, progress_), bound_m);
         level = std::move(out.level);
         const bool last = attempt + 1 == kAttempts;
@@ -228,7 +235,7 @@ bool Chain::within(double bound_m, LodLevel& level) {
             level.error_m = std::min(level.error_m, bound_m);
         }
         if (level.error_m <= bound_m && (last || out.crossings.empty())) {
-            last_.emplace(std::move(next));
+            last_ = next.surface();
             return true;
         }
         if (last)
@@ -244,15 +251,17 @@ bool Chain::within(double bound_m, LodLevel& level) {
 /// A level of so many triangles, whatever its bound then is. Returns false, and why, when there is
 /// none.
 bool Chain::of_triangles(std::size_t n, LodLevel& level, std::string& why) {
+    BoundedSimplifier start = simplifier(box_.longest() / 16);
     BoundedMesh mesh;
     try {
-        mesh = last_->to_triangles(n, progress_);
+        mesh = start.to_triangles(n, progress_);
     } catch (const Error& e) {
         if (e.fault() != Fault::numeric)
             throw;
         why = e.what();
         return false;
     }
+    last_ = start.surface();
     const double bound_m = mesh.bound_m / (1 - kRoundingShare);
     level = written(mesh, bound_m).level;
     level.bound_m = std::max(bound_m, level.error_m);

@@ -243,7 +243,7 @@ std::shared_ptr<const Field> surface_field(std::shared_ptr<const Field> field,
     const auto* mesh = dynamic_cast<const MeshField*>(field.get());
     if (!mesh)
         return field;
-    constexpr double kLeastFace_vox2 = 4;
+    constexpr double kLeastFace_vox2 = 16;
     const double voxel_m = lattice_of(*grid).voxel_m;
     const auto n_faces = static_cast<double>(mesh->mesh().triangles.size());
     const bool coarse =
