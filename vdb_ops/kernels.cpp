@@ -116,6 +116,53 @@ TAIHU_INLINE V8 hold(const V8& v, const Lanes& band, float limit) {
     return band ? v : side;
 }
 
+/// A ball's squared distances from the voxels of a leaf: those along x, and along y and z together.
+struct BallLeaf {
+    float r;
+    V8 dx2, dy2, z2;
+};
+
+/// values = max(values, r - distance) over the leaf.
+TAIHU_INLINE void subtract_everywhere(const BallLeaf& ball, float* values) {
+    float yz2[64];
+    for (int y = 0; y < 8; ++y)
+        store(yz2 + 8 * y, ball.z2 + ball.dy2[y]);
+    for (int x = 0; x < 8; ++x)
+        for (int y = 0; y < 8; y += 2) {
+            float* pair = values + 64 * x + 8 * y;
+            const V16 old = load_pair(pair);
+            V16 d = load_pair(yz2 + 8 * y) + ball.dx2[x];
+            for (int k = 0; k < 16; ++k)
+                d[k] = std::sqrt(d[k]);
+            d = ball.r - d;
+            store_pair(pair, d > old ? d : old);
+        }
+}
+
+/// The same in the pieces of the leaf whose bit is set: 8 * piece + x. A piece is the lower or the
+/// upper half of two rows, as in kPieceY and kPieceZ.
+TAIHU_INLINE void subtract_in(std::uint64_t pieces, const BallLeaf& ball, float* values) {
+    float yz2[64];
+    for (int i = 0; i < 4; ++i) {
+        const V8 first = kZero + ball.dy2[2 * i], second = kZero + ball.dy2[2 * i + 1],
+                 y2 = kSecond ? second : first;
+        const V8 &z2 = ball.z2, lower = __builtin_shufflevector(z2, z2, 0, 1, 2, 3, 0, 1, 2, 3),
+                 upper = __builtin_shufflevector(z2, z2, 4, 5, 6, 7, 4, 5, 6, 7);
+        store(yz2 + 16 * i, lower + y2);
+        store(yz2 + 16 * i + 8, upper + y2);
+    }
+    for (; pieces != 0; pieces &= pieces - 1) {
+        const int i = std::countr_zero(pieces), piece = i / 8, x = i % 8;
+        float* at = values + 64 * x + piece / 2 * 16 + piece % 2 * 4;
+        const V8 old = load_halves(at);
+        V8 d = load(yz2 + 8 * piece) + ball.dx2[x];
+        for (int k = 0; k < 8; ++k)
+            d[k] = std::sqrt(d[k]);
+        d = ball.r - d;
+        store_halves(at, d > old ? d : old);
+    }
+}
+
 } // namespace
 
 TAIHU_CLONES
@@ -126,34 +173,21 @@ void subtract_balls(const LeafBall* balls, const std::uint32_t* begin, const std
         const float cx = ball.x - static_cast<float>(leaf[0]),
                     cy = ball.y - static_cast<float>(leaf[1]),
                     cz = ball.z - static_cast<float>(leaf[2]), r = ball.r;
-        const V8 dx = kZ - cx, dy = kZ - cy, dz = kZ - cz, dx2 = dx * dx, dy2 = dy * dy,
-                 z2 = dz * dz;
-        // Pieces of two half rows: small balls reach little more. In bit 8 * piece + x of `gains`,
-        // whether the voxel nearest to the ball may gain by it; the margin is beyond what rounding
-        // does: leaving a piece out changes no bit.
+        const V8 dx = kZ - cx, dy = kZ - cy, dz = kZ - cz;
+        const BallLeaf in_leaf{r, dx * dx, dy * dy, dz * dz};
+        // Small balls reach little of a leaf. A piece counts if its voxel nearest to the ball may
+        // gain by it; the margin is beyond what rounding does: leaving one out changes no bit.
         const float reach = r - least + kMargin, reach2 = reach > 0 ? reach * reach : 0;
         const V8 off_y = outside(kPieceY, kPieceY + 1.f, cy),
                  off_z = outside(kPieceZ, kPieceZ + 3.f, cz), near2 = off_y * off_y + off_z * off_z;
         Lanes bits = {};
         for (int x = 0; x < 8; ++x)
-            bits |= (near2 + dx2[x] < reach2) & 1 << x;
-        float yz2[64];
-        for (int i = 0; i < 4; ++i) {
-            const V8 first = kZero + dy2[2 * i], second = kZero + dy2[2 * i + 1],
-                     y2 = kSecond ? second : first;
-            store(yz2 + 16 * i, __builtin_shufflevector(z2, z2, 0, 1, 2, 3, 0, 1, 2, 3) + y2);
-            store(yz2 + 16 * i + 8, __builtin_shufflevector(z2, z2, 4, 5, 6, 7, 4, 5, 6, 7) + y2);
-        }
-        for (std::uint64_t gains = bytes_of(bits); gains != 0; gains &= gains - 1) {
-            const int i = std::countr_zero(gains), piece = i / 8, x = i % 8;
-            float* at = values + 64 * x + piece / 2 * 16 + piece % 2 * 4;
-            const V8 old = load_halves(at);
-            V8 d = load(yz2 + 8 * piece) + dx2[x];
-            for (int k = 0; k < 8; ++k)
-                d[k] = std::sqrt(d[k]);
-            d = r - d;
-            store_halves(at, d > old ? d : old);
-        }
+            bits |= (near2 + in_leaf.dx2[x] < reach2) & 1 << x;
+        const std::uint64_t pieces = bytes_of(bits);
+        if (~pieces == 0)
+            subtract_everywhere(in_leaf, values);
+        else
+            subtract_in(pieces, in_leaf, values);
     }
 }
 
