@@ -52,7 +52,8 @@ MeshDiagnosis survey(const RepairedMesh& mesh, const std::string& where) {
 } // namespace
 
 MeshSolid mesh_solid(const TriMesh& mesh, const std::string& where, const CloseSettings& settings,
-                     const Lattice& lattice, Progress* progress) {
+                     const Lattice& lattice, Progress* progress,
+                     std::optional<double> memory_bytes) {
     if (settings.rule != CloseRule::winding)
         return solid_of(close_mesh(mesh, where, settings, progress));
     const RepairedMesh repaired = repair_mesh(mesh, std::nullopt, CloseRule::winding);
@@ -66,7 +67,7 @@ MeshSolid mesh_solid(const TriMesh& mesh, const std::string& where, const CloseS
     solid.diagnosis = survey(repaired, where);
     // The level in openings hardly leaves the box of the faces and their caps.
     solid.box = bounds({repaired.positions, repaired.triangles, {}});
-    refuse_if_too_large(solid.diagnosis.area_m2, solid.box, lattice.voxel_m);
+    refuse_if_too_large(solid.diagnosis.area_m2, solid.box, lattice.voxel_m, memory_bytes);
     solid.field =
         std::make_shared<PlacedLevelSetField>(winding_level_set(repaired, lattice, progress));
     return solid;

@@ -1,5 +1,6 @@
 #pragma once
 #include <memory>
+#include <optional>
 #include <string>
 
 #include "stats/core/box.h"
@@ -21,7 +22,8 @@ struct MeshSolid {
 /// one, and between its voxels elsewhere. A mesh without open edges needs no such rule: it is the
 /// same solid as under `loops` then.
 ///
-/// \param where  stands for the mesh in messages.
+/// \param where         stands for the mesh in messages.
+/// \param memory_bytes  of the level set under `winding`, as refuse_if_too_large() takes it.
 /// \throws Error bad_input: as close_mesh(); under `winding` when more places are neither in nor
 ///   out (w farther than 1/4 from a whole number) than inside. Measured: a boulder with 1 % of its
 ///   faces missing 0.001, 20 % 0.04, 30 % 0.9, half of them 1.5; half a ball 0.6, a bowl of a
@@ -31,6 +33,7 @@ struct MeshSolid {
 ///   unsupported and bad_argument, under `winding` too: as refuse_if_too_large() and
 ///   winding_level_set(); cancelled.
 MeshSolid mesh_solid(const TriMesh& mesh, const std::string& where, const CloseSettings& settings,
-                     const Lattice& lattice, Progress* progress = nullptr);
+                     const Lattice& lattice, Progress* progress = nullptr,
+                     std::optional<double> memory_bytes = std::nullopt);
 
 } // namespace taihu
