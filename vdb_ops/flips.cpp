@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstdint>
 #include <memory>
 #include <numeric>
 #include <set>
@@ -32,13 +33,16 @@ int reach_vox(float half_width_vox) {
 using Crossing = std::array<float, 3>;
 
 /// squared[512] = the least squared distance [voxels^2] from each voxel of a leaf to `points`, at
-/// most that of `far`. Rows farther than that are skipped.
+/// most that of `far`, in the rows along z whose bit 8 x + y is set.
 TAIHU_CLONES
-void nearest_squared(const Crossing* points, std::size_t n, float far, float* squared) {
+void nearest_squared(const Crossing* points, std::size_t n, float far, std::uint64_t rows,
+                     float* squared) {
     const float far2 = far * far;
     for (int v = 0; v < 512; ++v)
         squared[v] = far2;
     for (std::size_t i = 0; i < n; ++i) {
+        const float above = std::max(points[i][2] - 7, -points[i][2]), off = std::max(above, 0.f);
+        const float rest = far2 - off * off; // for x and y
         float dz2[8];
         for (int z = 0; z < 8; ++z) {
             const float dz = points[i][2] - static_cast<float>(z);
@@ -46,10 +50,12 @@ void nearest_squared(const Crossing* points, std::size_t n, float far, float* sq
         }
         for (int x = 0; x < 8; ++x) {
             const float dx = points[i][0] - static_cast<float>(x);
+            if (dx * dx >= rest)
+                continue;
             for (int y = 0; y < 8; ++y) {
                 const float dy = points[i][1] - static_cast<float>(y);
                 const float row = dx * dx + dy * dy;
-                if (row >= far2)
+                if (row >= rest || !(rows >> (8 * x + y) & 1))
                     continue;
                 float* out = squared + 64 * x + 8 * y;
                 for (int z = 0; z < 8; ++z)
@@ -65,14 +71,18 @@ public:
     Neighbourhood(const openvdb::FloatGrid::ConstAccessor& values, const MaskAccessor& mask,
                   const Coord& leaf, int reach)
         : reach_(reach), size_(8 + 2 * reach),
-          old_(static_cast<std::size_t>(size_ * size_ * size_)), flipped_(old_.size()) {
-        const Coord lo = leaf.offsetBy(-reach), hi = leaf.offsetBy(7 + reach);
-        for (int x = lo.x() >> 3; x <= hi.x() >> 3; ++x)
-            for (int y = lo.y() >> 3; y <= hi.y() >> 3; ++y)
-                for (int z = lo.z() >> 3; z <= hi.z() >> 3; ++z)
-                    copy_block(values, mask, Coord(x, y, z) << 3, lo, hi);
-        if (any_flipped_)
-            find_crossings();
+          flipped_(static_cast<std::size_t>(size_ * size_ * size_)) {
+        const CoordBBox box(leaf.offsetBy(-reach), leaf.offsetBy(7 + reach));
+        each_block(box, [&](const Coord& block, const CoordBBox& part) {
+            copy_mask(mask, block, part, box.min());
+        });
+        if (!any_flipped_)
+            return;
+        old_.resize(flipped_.size());
+        each_block(box, [&](const Coord& block, const CoordBBox& part) {
+            copy_values(values, block, part, box.min());
+        });
+        find_crossings();
     }
 
     bool any_flipped() const { return any_flipped_; }
@@ -90,21 +100,49 @@ private:
     std::size_t index(int x, int y, int z) const {
         return static_cast<std::size_t>((x * size_ + y) * size_ + z);
     }
-    void copy_block(const openvdb::FloatGrid::ConstAccessor& values, const MaskAccessor& mask,
-                    const Coord& block, const Coord& lo, const Coord& hi) {
-        const Leaf* leaf = values.probeConstLeaf(block);
+    /// fn(block, its part in the box), for blocks of 8^3.
+    template <class Fn>
+    static void each_block(const CoordBBox& box, Fn&& fn) {
+        for (int x = box.min().x() & -8; x <= box.max().x(); x += 8)
+            for (int y = box.min().y() & -8; y <= box.max().y(); y += 8)
+                for (int z = box.min().z() & -8; z <= box.max().z(); z += 8) {
+                    CoordBBox part = CoordBBox::createCube(Coord(x, y, z), 8);
+                    part.intersect(box);
+                    fn(Coord(x, y, z), part);
+                }
+    }
+    /// fn(place of a row's first voxel here, number of the same in its block).
+    template <class Fn>
+    void each_row(const CoordBBox& part, const Coord& lo, Fn&& fn) const {
+        for (int x = part.min().x(); x <= part.max().x(); ++x)
+            for (int y = part.min().y(); y <= part.max().y(); ++y)
+                fn(index(x - lo.x(), y - lo.y(), part.min().z() - lo.z()),
+                   Leaf::coordToOffset(Coord(x, y, part.min().z())));
+    }
+    void copy_mask(const MaskAccessor& mask, const Coord& block, const CoordBBox& part,
+                   const Coord& lo) {
         const auto* bits = mask.probeConstLeaf(block);
-        const float value = leaf ? 0 : values.getValue(block);
         const bool on = !bits && mask.isValueOn(block);
-        CoordBBox box(block, block.offsetBy(7));
-        box.intersect(CoordBBox(lo, hi));
-        for (auto at = box.begin(); at != box.end(); ++at) {
-            const Coord from = *at - lo;
-            const std::size_t i = index(from.x(), from.y(), from.z());
-            old_[i] = leaf ? leaf->getValue(*at) : value;
-            flipped_[i] = bits ? bits->isValueOn(*at) : on;
-            any_flipped_ |= flipped_[i] != 0;
-        }
+        if (!bits && !on)
+            return;
+        each_row(part, lo, [&](std::size_t to, openvdb::Index from) {
+            for (int z = 0; z < part.dim().z(); ++z, ++to, ++from) {
+                flipped_[to] = on || bits->isValueOn(from);
+                any_flipped_ |= flipped_[to] != 0;
+            }
+        });
+    }
+    void copy_values(const openvdb::FloatGrid::ConstAccessor& values, const Coord& block,
+                     const CoordBBox& part, const Coord& lo) {
+        const Leaf* leaf = values.probeConstLeaf(block);
+        const float value = leaf ? 0 : values.getValue(block);
+        each_row(part, lo, [&](std::size_t to, openvdb::Index from) {
+            float* row = old_.data() + to;
+            if (leaf)
+                std::copy_n(leaf->buffer().data() + from, part.dim().z(), row);
+            else
+                std::fill_n(row, part.dim().z(), value);
+        });
     }
     void find_crossings() {
         const std::size_t strides[3] = {index(1, 0, 0), index(0, 1, 0), 1};
@@ -146,9 +184,15 @@ void rebuild_leaf(Leaf& leaf, const Neighbourhood& near, float half_width, float
     // surface.
     const float far = half_width + 1;
     alignas(64) float staying[512], going[512], cut[512];
-    nearest_squared(near.staying().data(), near.staying().size(), far, staying);
-    nearest_squared(near.going().data(), near.going().size(), far, going);
-    nearest_squared(near.cut().data(), near.cut().size(), far, cut);
+    constexpr std::uint64_t kAllRows = ~std::uint64_t{0};
+    nearest_squared(near.going().data(), near.going().size(), far, kAllRows, going);
+    nearest_squared(near.cut().data(), near.cut().size(), far, kAllRows, cut);
+    // Elsewhere nothing changes, wherever the surface is that stays.
+    std::uint64_t rows = 0;
+    for (int v = 0; v < 512; ++v)
+        if (near.flipped(v / 64, v / 8 % 8, v % 8) || going[v] < far * far || cut[v] < far * far)
+            rows |= std::uint64_t{1} << v / 8;
+    nearest_squared(near.staying().data(), near.staying().size(), far, rows, staying);
     for (int v = 0; v < 512; ++v) {
         const int x = v / 64, y = v / 8 % 8, z = v % 8;
         const float old = near.old(x, y, z);
