@@ -28,7 +28,7 @@ struct CarveArgs {
     std::filesystem::path holes, out;
     PlacementOptions placement;
     double foot_deg = 0;
-    std::string pieces = "largest", bubbles = "fill", memory, min_neck;
+    std::string pieces = "largest", bubbles = "fill", min_neck;
     SurfaceOptions surface;
     TileOptions tiles;
 };
@@ -134,8 +134,8 @@ void write_carved_tiles(const CarveArgs& args, const Solid& base, const LawHoles
 /// Before the work: whether base, rock and what is made of it fit into memory.
 void refuse_if_too_much(const CarveArgs& args, const Solid& base, const LawHoles& holes) {
     std::optional<double> asked;
-    if (!args.memory.empty())
-        asked = memory_bytes("--memory", args.memory);
+    if (!args.base.memory.empty())
+        asked = memory_bytes("--memory", args.base.memory);
     const double limit = memory_limit_bytes(asked);
     MemoryUse use{.base_leaves = static_cast<double>(base.grid->tree().leafCount()),
                   .cleaned = true,
@@ -245,7 +245,7 @@ void add_carve(CLI::App& app, Console& console) {
     args->base.add_voxel_options(*verb);
     args->surface.add_options(*verb);
     args->tiles.add_option(*verb);
-    verb->add_option("--memory", args->memory,
+    verb->add_option("--memory", args->base.memory,
                      "Refuse what would need more, as 4GB [what the machine has left]");
     verb->callback([args, &console] { console.with_threads([&] { run(*args, console); }); });
 }

@@ -137,6 +137,8 @@ Solid read_solid(const SolidOptions& options, const Console& console, Surfaces s
         settings.voxel_m = options.voxel.empty()
                                ? voxel_for(box, options.dim.value_or(kDefaultDim))
                                : length_m("--voxel", options.voxel, {0, box.longest()});
+        if (!options.memory.empty())
+            settings.memory_bytes = memory_bytes("--memory", options.memory);
         report_stage(console.progress, "voxelizing");
         VoxelizeResult result = voxelize(mesh, where, settings, console.progress);
         solid.grid = result.solid;

@@ -28,6 +28,7 @@ struct SolidOptions {
     std::optional<std::string> shells; ///< union, parity
     std::optional<double> unit_m;
     std::optional<std::string> up; ///< y, z
+    std::string memory;            ///< refuse a mesh whose level set would need more
 
     void add_mesh_options(CLI::App& verb);  ///< --unit, --up
     void add_voxel_options(CLI::App& verb); ///< --dim, --voxel, --close, --shells, and these

@@ -40,7 +40,7 @@ public:
                std::span<const std::uint32_t> near, float half_width)
         : block_(block), half_width_(half_width), leaves_(kLeaf, Coord(kAcross), half_width) {
         const Vec3 origin{double(block.x()), double(block.y()), double(block.z())};
-        std::vector<CubeLists::Hit> hits;
+        CubeLists::Hits hits;
         balls_.reserve(near.size());
         for (std::size_t n = 0; n < near.size(); ++n) {
             __builtin_prefetch(&all[near[std::min(n + 8, near.size() - 1)]]);
@@ -151,7 +151,7 @@ private:
             return;
         while (!cells_fit(box))
             ++shift_;
-        std::vector<std::vector<CubeLists::Hit>> hits((balls_.size() + kChunk - 1) / kChunk);
+        std::vector<CubeLists::Hits> hits((balls_.size() + kChunk - 1) / kChunk);
         tbb::parallel_for(std::size_t{0}, hits.size(), [&](std::size_t chunk) {
             const std::size_t end = std::min(balls_.size(), (chunk + 1) * kChunk);
             for (std::size_t i = chunk * kChunk; i < end; ++i)

@@ -22,7 +22,17 @@ double farthest2(double c, double first, double last) {
 
 } // namespace
 
-bool CubeLists::box_of(const VoxelBall& ball, openvdb::Coord& lo, openvdb::Coord& hi) const {
+CubeLists::Hit* CubeLists::Hits::room_for(std::size_t n) {
+    if (size_ + n > room_) {
+        room_ = std::max(2 * room_, size_ + n);
+        auto larger = std::make_unique_for_overwrite<Hit[]>(room_);
+        std::copy(begin(), end(), larger.get());
+        hits_ = std::move(larger);
+    }
+    return hits_.get() + size_;
+}
+
+inline bool CubeLists::box_of(const VoxelBall& ball, openvdb::Coord& lo, openvdb::Coord& hi) const {
     const double reach = ball.r + half_width_ + kMargin;
     for (int axis = 0; axis < 3; ++axis) {
         const double from = (ball.center[axis] - reach) * inverse_size_;
@@ -40,7 +50,7 @@ double CubeLists::n_looked_at(const VoxelBall& ball) const {
     return box_of(ball, lo, hi) ? double(openvdb::CoordBBox(lo, hi).volume()) : 0;
 }
 
-void CubeLists::find(const VoxelBall& ball, std::uint32_t number, std::vector<Hit>& hits) {
+void CubeLists::find(const VoxelBall& ball, std::uint32_t number, Hits& hits) {
     openvdb::Coord lo, hi;
     if (!box_of(ball, lo, hi))
         return;
@@ -49,8 +59,8 @@ void CubeLists::find(const VoxelBall& ball, std::uint32_t number, std::vector<Hi
     const double edge = size_ - 1; // from the first voxel of a cube to its last
     const bool may_cover = inner >= std::sqrt(0.75) * edge;
     const Vec3 c = ball.center;
-    std::size_t n = hits.size();
-    hits.resize(n + openvdb::CoordBBox(lo, hi).volume());
+    Hit* const first = hits.room_for(openvdb::CoordBBox(lo, hi).volume());
+    Hit* hit = first;
     for (int i = lo.x(); i <= hi.x(); ++i) {
         const double x = i * size_, near_x2 = nearest2(c.x, x, x + edge),
                      far_x2 = farthest2(c.x, x, x + edge);
@@ -64,16 +74,16 @@ void CubeLists::find(const VoxelBall& ball, std::uint32_t number, std::vector<Hi
                 if (may_cover && far2 + farthest2(c.z, z, z + edge) <= inner2)
                     covered.store(1, std::memory_order_relaxed);
                 // Written in any case and kept if it counts: no branch to guess wrong.
-                hits[n] = {static_cast<std::uint32_t>(cube), number};
-                n += (near2 + nearest2(c.z, z, z + edge) < reach2) &
-                     !covered.load(std::memory_order_relaxed);
+                *hit = {static_cast<std::uint32_t>(cube), number};
+                hit += (near2 + nearest2(c.z, z, z + edge) < reach2) &
+                       !covered.load(std::memory_order_relaxed);
             }
         }
     }
-    hits.resize(n);
+    hits.size_ += static_cast<std::size_t>(hit - first);
 }
 
-void CubeLists::sort(std::span<const std::vector<Hit>> hits) {
+void CubeLists::sort(std::span<const Hits> hits) {
     const std::size_t n_cubes = covered_.size();
     first_.assign(n_cubes + 1, 0);
     for (const auto& part : hits)

@@ -1,5 +1,6 @@
 #pragma once
 #include <cstdint>
+#include <memory>
 #include <span>
 #include <vector>
 
@@ -23,6 +24,21 @@ public:
         std::uint32_t cube, ball;
     };
 
+    /// A list of them, whose new places are not filled before they are written.
+    class Hits {
+    public:
+        std::size_t size() const { return size_; }
+        const Hit* begin() const { return hits_.get(); }
+        const Hit* end() const { return hits_.get() + size_; }
+
+    private:
+        friend CubeLists;
+        /// Where up to n more may be written.
+        Hit* room_for(std::size_t n);
+        std::unique_ptr<Hit[]> hits_;
+        std::size_t size_ = 0, room_ = 0;
+    };
+
     /// \param n  cubes along each axis; their product is below 2^32.
     CubeLists(int size, const openvdb::Coord& n, double half_width)
         : size_(size), inverse_size_(1.0 / size), n_(n), half_width_(half_width),
@@ -30,11 +46,11 @@ public:
 
     /// Appends the cubes that ball number `number` comes near, but for those that turned out to be
     /// covered by now: they lie deep inside a ball. Thread-safe.
-    void find(const VoxelBall& ball, std::uint32_t number, std::vector<Hit>& hits);
+    void find(const VoxelBall& ball, std::uint32_t number, Hits& hits);
     /// At most how many cubes find() looks at.
     double n_looked_at(const VoxelBall& ball) const;
     /// Sorts all hits by cube, without those in covered ones; within a cube they keep their order.
-    void sort(std::span<const std::vector<Hit>> hits);
+    void sort(std::span<const Hits> hits);
 
     Cover cover(std::size_t cube) const {
         if (covered_[cube])

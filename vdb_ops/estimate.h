@@ -25,7 +25,7 @@ struct MemoryUse {
     bool cleaned = false, meshed = false;
 
     /// At the peak [bytes], within a factor of two from 100 MB on: 2.4 kB a leaf, as much again for
-    /// what is written, 8 kB with cleaning, 40 kB with a mesh and its certificate.
+    /// what is written, 8 kB with cleaning, 70 kB with a mesh and its certificate.
     double bytes() const;
 };
 

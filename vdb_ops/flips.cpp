@@ -2,10 +2,15 @@
 
 #include <algorithm>
 #include <array>
+#include <bit>
 #include <cmath>
+#include <cstdint>
+#include <cstring>
 #include <memory>
 #include <numeric>
 #include <set>
+#include <utility>
+#include <vector>
 
 #include <tbb/parallel_for.h>
 
@@ -31,30 +36,64 @@ int reach_vox(float half_width_vox) {
 /// A place where a grid edge crosses the surface, in voxels from a leaf's first.
 using Crossing = std::array<float, 3>;
 
-/// squared[512] = the least squared distance [voxels^2] from each voxel of a leaf to `points`, at
-/// most that of `far`. Rows farther than that are skipped.
+/// Crossings about a leaf by columns along z, in a cube of `size` voxels with the leaf in its
+/// middle.
+class Crossings {
+public:
+    explicit Crossings(int size) : size_(size) {
+        first_.reserve(static_cast<std::size_t>(size * size) + 1);
+    }
+    /// The next column begins, y fastest.
+    void begin_column() { first_.push_back(static_cast<std::uint32_t>(points_.size())); }
+    void add(const Crossing& p) { points_.push_back(p); }
+    bool empty() const { return points_.empty(); }
+    /// Those of the columns (x, y0) to (x, y1), cut to what there is.
+    std::pair<const Crossing*, const Crossing*> columns(int x, int y0, int y1) const {
+        const std::size_t row = static_cast<std::size_t>(x * size_);
+        const std::size_t begin = row + static_cast<std::size_t>(std::max(y0, 0)),
+                          end = row + static_cast<std::size_t>(std::min(y1, size_ - 1)) + 1;
+        return {points_.data() + first_[begin],
+                points_.data() + (end < first_.size() ? first_[end] : points_.size())};
+    }
+    int size() const { return size_; }
+
+private:
+    int size_;
+    std::vector<Crossing> points_;
+    std::vector<std::uint32_t> first_; ///< by column
+};
+
+/// row[8] = min(row, the squared distances of voxels (x, y, 0..7)) to the points from `p` to `end`.
 TAIHU_CLONES
-void nearest_squared(const Crossing* points, std::size_t n, float far, float* squared) {
-    const float far2 = far * far;
-    for (int v = 0; v < 512; ++v)
-        squared[v] = far2;
-    for (std::size_t i = 0; i < n; ++i) {
-        float dz2[8];
+void nearer_row(const Crossing* p, const Crossing* end, float x, float y, float* row) {
+    float best[8];
+    std::copy_n(row, 8, best);
+    for (; p != end; ++p) {
+        const float dx = (*p)[0] - x, dy = (*p)[1] - y, across = dx * dx + dy * dy;
         for (int z = 0; z < 8; ++z) {
-            const float dz = points[i][2] - static_cast<float>(z);
-            dz2[z] = dz * dz;
+            const float dz = (*p)[2] - static_cast<float>(z), d = across + dz * dz;
+            best[z] = d < best[z] ? d : best[z];
         }
-        for (int x = 0; x < 8; ++x) {
-            const float dx = points[i][0] - static_cast<float>(x);
-            for (int y = 0; y < 8; ++y) {
-                const float dy = points[i][1] - static_cast<float>(y);
-                const float row = dx * dx + dy * dy;
-                if (row >= far2)
-                    continue;
-                float* out = squared + 64 * x + 8 * y;
-                for (int z = 0; z < 8; ++z)
-                    out[z] = row + dz2[z] < out[z] ? row + dz2[z] : out[z];
-            }
+    }
+    std::copy_n(best, 8, row);
+}
+
+/// squared[512] = the least squared distance [voxels^2] from each voxel of a leaf to `points`, at
+/// most that of `far`, in the rows along z whose bit 8 x + y is set.
+void nearest_squared(const Crossings& points, float far, std::uint64_t rows, float* squared) {
+    std::fill_n(squared, 512, far * far);
+    if (points.empty())
+        return;
+    const int before = points.size() / 2 - 4, reach = static_cast<int>(std::ceil(far));
+    for (; rows != 0; rows &= rows - 1) {
+        const int row = std::countr_zero(rows), x = row / 8, y = row % 8;
+        // A crossing lies less than a voxel beyond the first of its edge.
+        const int x0 = std::max(before + x - reach, 0),
+                  x1 = std::min(before + x + reach, points.size() - 1);
+        for (int column = x0; column <= x1; ++column) {
+            const auto [first, end] =
+                points.columns(column, before + y - reach, before + y + reach);
+            nearer_row(first, end, static_cast<float>(x), static_cast<float>(y), squared + 8 * row);
         }
     }
 }
@@ -65,14 +104,19 @@ public:
     Neighbourhood(const openvdb::FloatGrid::ConstAccessor& values, const MaskAccessor& mask,
                   const Coord& leaf, int reach)
         : reach_(reach), size_(8 + 2 * reach),
-          old_(static_cast<std::size_t>(size_ * size_ * size_)), flipped_(old_.size()) {
-        const Coord lo = leaf.offsetBy(-reach), hi = leaf.offsetBy(7 + reach);
-        for (int x = lo.x() >> 3; x <= hi.x() >> 3; ++x)
-            for (int y = lo.y() >> 3; y <= hi.y() >> 3; ++y)
-                for (int z = lo.z() >> 3; z <= hi.z() >> 3; ++z)
-                    copy_block(values, mask, Coord(x, y, z) << 3, lo, hi);
-        if (any_flipped_)
-            find_crossings();
+          flipped_(static_cast<std::size_t>(size_ * size_ * size_)), staying_(size_), going_(size_),
+          cut_(size_) {
+        const CoordBBox box(leaf.offsetBy(-reach), leaf.offsetBy(7 + reach));
+        each_block(box, [&](const Coord& block, const CoordBBox& part) {
+            copy_mask(mask, block, part, box.min());
+        });
+        if (!any_flipped_)
+            return;
+        old_.resize(flipped_.size());
+        each_block(box, [&](const Coord& block, const CoordBBox& part) {
+            copy_values(values, block, part, box.min());
+        });
+        find_crossings();
     }
 
     bool any_flipped() const { return any_flipped_; }
@@ -81,62 +125,101 @@ public:
         return flipped_[index(x + reach_, y + reach_, z + reach_)] != 0;
     }
     /// Where the surface that stays, and the one that goes, cross the edges of the grid.
-    const std::vector<Crossing>& staying() const { return staying_; }
-    const std::vector<Crossing>& going() const { return going_; }
+    const Crossings& staying() const { return staying_; }
+    const Crossings& going() const { return going_; }
     /// New surface, where a cut goes through what was on one side.
-    const std::vector<Crossing>& cut() const { return cut_; }
+    const Crossings& cut() const { return cut_; }
 
 private:
     std::size_t index(int x, int y, int z) const {
         return static_cast<std::size_t>((x * size_ + y) * size_ + z);
     }
-    void copy_block(const openvdb::FloatGrid::ConstAccessor& values, const MaskAccessor& mask,
-                    const Coord& block, const Coord& lo, const Coord& hi) {
-        const Leaf* leaf = values.probeConstLeaf(block);
+    /// fn(block, its part in the box), for blocks of 8^3.
+    template <class Fn>
+    static void each_block(const CoordBBox& box, Fn&& fn) {
+        for (int x = box.min().x() & -8; x <= box.max().x(); x += 8)
+            for (int y = box.min().y() & -8; y <= box.max().y(); y += 8)
+                for (int z = box.min().z() & -8; z <= box.max().z(); z += 8) {
+                    CoordBBox part = CoordBBox::createCube(Coord(x, y, z), 8);
+                    part.intersect(box);
+                    fn(Coord(x, y, z), part);
+                }
+    }
+    /// fn(place of a row's first voxel here, number of the same in its block).
+    template <class Fn>
+    void each_row(const CoordBBox& part, const Coord& lo, Fn&& fn) const {
+        for (int x = part.min().x(); x <= part.max().x(); ++x)
+            for (int y = part.min().y(); y <= part.max().y(); ++y)
+                fn(index(x - lo.x(), y - lo.y(), part.min().z() - lo.z()),
+                   Leaf::coordToOffset(Coord(x, y, part.min().z())));
+    }
+    void copy_mask(const MaskAccessor& mask, const Coord& block, const CoordBBox& part,
+                   const Coord& lo) {
         const auto* bits = mask.probeConstLeaf(block);
-        const float value = leaf ? 0 : values.getValue(block);
         const bool on = !bits && mask.isValueOn(block);
-        CoordBBox box(block, block.offsetBy(7));
-        box.intersect(CoordBBox(lo, hi));
-        for (auto at = box.begin(); at != box.end(); ++at) {
-            const Coord from = *at - lo;
-            const std::size_t i = index(from.x(), from.y(), from.z());
-            old_[i] = leaf ? leaf->getValue(*at) : value;
-            flipped_[i] = bits ? bits->isValueOn(*at) : on;
-            any_flipped_ |= flipped_[i] != 0;
-        }
+        if (!bits && !on)
+            return;
+        each_row(part, lo, [&](std::size_t to, openvdb::Index from) {
+            for (int z = 0; z < part.dim().z(); ++z, ++to, ++from) {
+                flipped_[to] = on || bits->isValueOn(from);
+                any_flipped_ |= flipped_[to] != 0;
+            }
+        });
+    }
+    void copy_values(const openvdb::FloatGrid::ConstAccessor& values, const Coord& block,
+                     const CoordBBox& part, const Coord& lo) {
+        const Leaf* leaf = values.probeConstLeaf(block);
+        const float value = leaf ? 0 : values.getValue(block);
+        each_row(part, lo, [&](std::size_t to, openvdb::Index from) {
+            float* row = old_.data() + to;
+            if (leaf)
+                std::copy_n(leaf->buffer().data() + from, part.dim().z(), row);
+            else
+                std::fill_n(row, part.dim().z(), value);
+        });
     }
     void find_crossings() {
+        // What a voxel is: two that are the same have nothing between them.
+        std::vector<char> kind(old_.size());
+        for (std::size_t p = 0; p < old_.size(); ++p)
+            kind[p] = static_cast<char>(2 * (flipped_[p] != 0) + (old_[p] < 0));
         const std::size_t strides[3] = {index(1, 0, 0), index(0, 1, 0), 1};
         for (int x = 0; x < size_; ++x)
-            for (int y = 0; y < size_; ++y)
-                for (int z = 0; z < size_; ++z) {
-                    const int at[3] = {x, y, z};
-                    const std::size_t p = index(x, y, z);
-                    for (std::size_t axis = 0; axis < 3; ++axis) {
-                        if (at[axis] + 1 == size_)
-                            continue;
-                        const std::size_t q = p + strides[axis];
-                        const bool crossing = (old_[p] < 0) != (old_[q] < 0);
-                        if (!crossing && flipped_[p] == flipped_[q])
-                            continue;
-                        Crossing point = {static_cast<float>(x - reach_),
-                                          static_cast<float>(y - reach_),
-                                          static_cast<float>(z - reach_)};
-                        point[axis] += crossing ? old_[p] / (old_[p] - old_[q]) : 0.5f;
-                        (!crossing                    ? cut_
-                         : flipped_[p] || flipped_[q] ? going_
-                                                      : staying_)
-                            .push_back(point);
-                    }
-                }
+            for (int y = 0; y < size_; ++y) {
+                for (Crossings* list : {&staying_, &going_, &cut_})
+                    list->begin_column();
+                const int last[3] = {x + 1, y + 1, 0};
+                for (std::size_t axis = 0; axis < 3; ++axis)
+                    if (last[axis] < size_)
+                        cross_row(kind.data(), x, y, axis, strides[axis]);
+            }
+    }
+    /// The edges along an axis from the voxels of a row, eight at a time.
+    void cross_row(const char* kind, int x, int y, std::size_t axis, std::size_t stride) {
+        const int n = axis == 2 ? size_ - 1 : size_;
+        for (int z0 = 0; z0 < n; z0 += 8) {
+            const std::size_t p0 = index(x, y, z0);
+            if (p0 + stride + 8 <= old_.size() &&
+                std::memcmp(kind + p0, kind + p0 + stride, 8) == 0)
+                continue;
+            for (int z = z0; z < std::min(z0 + 8, n); ++z) {
+                const std::size_t p = index(x, y, z), q = p + stride;
+                if (kind[p] == kind[q])
+                    continue;
+                const bool crossing = (old_[p] < 0) != (old_[q] < 0);
+                Crossing point = {static_cast<float>(x - reach_), static_cast<float>(y - reach_),
+                                  static_cast<float>(z - reach_)};
+                point[axis] += crossing ? old_[p] / (old_[p] - old_[q]) : 0.5f;
+                (!crossing ? cut_ : flipped_[p] || flipped_[q] ? going_ : staying_).add(point);
+            }
+        }
     }
 
     int reach_, size_;
     bool any_flipped_ = false;
     std::vector<float> old_;
     std::vector<char> flipped_;
-    std::vector<Crossing> staying_, going_, cut_;
+    Crossings staying_, going_, cut_;
 };
 
 /// Rebuild the values of one leaf whose surroundings changed.
@@ -146,9 +229,15 @@ void rebuild_leaf(Leaf& leaf, const Neighbourhood& near, float half_width, float
     // surface.
     const float far = half_width + 1;
     alignas(64) float staying[512], going[512], cut[512];
-    nearest_squared(near.staying().data(), near.staying().size(), far, staying);
-    nearest_squared(near.going().data(), near.going().size(), far, going);
-    nearest_squared(near.cut().data(), near.cut().size(), far, cut);
+    constexpr std::uint64_t kAllRows = ~std::uint64_t{0};
+    nearest_squared(near.going(), far, kAllRows, going);
+    nearest_squared(near.cut(), far, kAllRows, cut);
+    // Elsewhere nothing changes, wherever the surface is that stays.
+    std::uint64_t rows = 0;
+    for (int v = 0; v < 512; ++v)
+        if (near.flipped(v / 64, v / 8 % 8, v % 8) || going[v] < far * far || cut[v] < far * far)
+            rows |= std::uint64_t{1} << v / 8;
+    nearest_squared(near.staying(), far, rows, staying);
     for (int v = 0; v < 512; ++v) {
         const int x = v / 64, y = v / 8 % 8, z = v % 8;
         const float old = near.old(x, y, z);

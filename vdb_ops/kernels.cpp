@@ -1,4 +1,5 @@
 #include <algorithm>
+#include <bit>
 #include <cmath>
 #include <cstdlib>
 #include <cstring>
@@ -16,6 +17,7 @@ constexpr float kMargin = 1e-3f;    // voxels; distances are right to a fifth of
 
 // Eight voxels along z at a time; compilers split them where registers are shorter.
 typedef float V8 __attribute__((vector_size(32)));
+typedef float V4 __attribute__((vector_size(16)));
 typedef std::int32_t Lanes __attribute__((vector_size(32)));
 typedef float V16 __attribute__((vector_size(64))); // two rows, y and y + 1
 typedef std::int32_t PairLanes __attribute__((vector_size(64)));
@@ -24,6 +26,8 @@ typedef double D8 __attribute__((vector_size(64)));
 namespace {
 
 constexpr V8 kZ = {0, 1, 2, 3, 4, 5, 6, 7}, kZero = {}, kOne = kZero + 1.f, kLast = kZero + 7.f;
+constexpr V8 kPieceY = {0, 0, 2, 2, 4, 4, 6, 6}, kPieceZ = {0, 4, 0, 4, 0, 4, 0, 4};
+constexpr Lanes kSecond = {0, 0, 0, 0, -1, -1, -1, -1};
 constexpr V16 kPairZ = {0, 1, 2, 3, 4, 5, 6, 7, 0, 1, 2, 3, 4, 5, 6, 7},
               kPairY = {0, 0, 0, 0, 0, 0, 0, 0, 1, 1, 1, 1, 1, 1, 1, 1}, kNone16 = {};
 
@@ -47,6 +51,27 @@ TAIHU_INLINE void store_pair(float* p, const V16& v) {
     std::memcpy(p, &v, sizeof v);
 }
 
+/// Half a row each of two rows, one below the other.
+TAIHU_INLINE V8 load_halves(const float* p) {
+    V4 a, b;
+    std::memcpy(&a, p, sizeof a);
+    std::memcpy(&b, p + 8, sizeof b);
+    return __builtin_shufflevector(a, b, 0, 1, 2, 3, 4, 5, 6, 7);
+}
+
+TAIHU_INLINE void store_halves(float* p, const V8& v) {
+    const V4 a = __builtin_shufflevector(v, v, 0, 1, 2, 3),
+             b = __builtin_shufflevector(v, v, 4, 5, 6, 7);
+    std::memcpy(p, &a, sizeof a);
+    std::memcpy(p + 8, &b, sizeof b);
+}
+
+/// How far c lies outside of [lo, hi].
+TAIHU_INLINE V8 outside(const V8& lo, const V8& hi, float c) {
+    const V8 below = lo - c, above = c - hi, out = below > above ? below : above;
+    return out > kZero ? out : kZero;
+}
+
 /// How far v lies outside of [lo, hi].
 TAIHU_INLINE V16 beyond(const V16& v, float lo, float hi) {
     const V16 below = lo - v, above = v - hi, out = below > above ? below : above;
@@ -61,13 +86,18 @@ TAIHU_INLINE bool any(const PairLanes& lanes) {
     return (words[0] | words[1]) != 0;
 }
 
-/// Bit k is set where lane k is.
-TAIHU_INLINE std::uint64_t bits_of(const Lanes& lanes) {
+/// The lowest byte of each lane.
+TAIHU_INLINE std::uint64_t bytes_of(const Lanes& lanes) {
     typedef signed char Bytes __attribute__((vector_size(8)));
     const Bytes bytes = __builtin_convertvector(lanes, Bytes);
     std::uint64_t word;
     std::memcpy(&word, &bytes, sizeof word);
-    return (word & 0x8040201008040201u) * 0x0101010101010101u >> 56;
+    return word;
+}
+
+/// Bit k is set where lane k is.
+TAIHU_INLINE std::uint64_t bits_of(const Lanes& lanes) {
+    return (bytes_of(lanes) & 0x8040201008040201u) * 0x0101010101010101u >> 56;
 }
 
 /// Lane k is set where bit k of row `i` of the leaf is.
@@ -86,6 +116,53 @@ TAIHU_INLINE V8 hold(const V8& v, const Lanes& band, float limit) {
     return band ? v : side;
 }
 
+/// A ball's squared distances from the voxels of a leaf: those along x, and along y and z together.
+struct BallLeaf {
+    float r;
+    V8 dx2, dy2, z2;
+};
+
+/// values = max(values, r - distance) over the leaf.
+TAIHU_INLINE void subtract_everywhere(const BallLeaf& ball, float* values) {
+    float yz2[64];
+    for (int y = 0; y < 8; ++y)
+        store(yz2 + 8 * y, ball.z2 + ball.dy2[y]);
+    for (int x = 0; x < 8; ++x)
+        for (int y = 0; y < 8; y += 2) {
+            float* pair = values + 64 * x + 8 * y;
+            const V16 old = load_pair(pair);
+            V16 d = load_pair(yz2 + 8 * y) + ball.dx2[x];
+            for (int k = 0; k < 16; ++k)
+                d[k] = std::sqrt(d[k]);
+            d = ball.r - d;
+            store_pair(pair, d > old ? d : old);
+        }
+}
+
+/// The same in the pieces of the leaf whose bit is set: 8 * piece + x. A piece is the lower or the
+/// upper half of two rows, as in kPieceY and kPieceZ.
+TAIHU_INLINE void subtract_in(std::uint64_t pieces, const BallLeaf& ball, float* values) {
+    float yz2[64];
+    for (int i = 0; i < 4; ++i) {
+        const V8 first = kZero + ball.dy2[2 * i], second = kZero + ball.dy2[2 * i + 1],
+                 y2 = kSecond ? second : first;
+        const V8 &z2 = ball.z2, lower = __builtin_shufflevector(z2, z2, 0, 1, 2, 3, 0, 1, 2, 3),
+                 upper = __builtin_shufflevector(z2, z2, 4, 5, 6, 7, 4, 5, 6, 7);
+        store(yz2 + 16 * i, lower + y2);
+        store(yz2 + 16 * i + 8, upper + y2);
+    }
+    for (; pieces != 0; pieces &= pieces - 1) {
+        const int i = std::countr_zero(pieces), piece = i / 8, x = i % 8;
+        float* at = values + 64 * x + piece / 2 * 16 + piece % 2 * 4;
+        const V8 old = load_halves(at);
+        V8 d = load(yz2 + 8 * piece) + ball.dx2[x];
+        for (int k = 0; k < 8; ++k)
+            d[k] = std::sqrt(d[k]);
+        d = ball.r - d;
+        store_halves(at, d > old ? d : old);
+    }
+}
+
 } // namespace
 
 TAIHU_CLONES
@@ -96,36 +173,21 @@ void subtract_balls(const LeafBall* balls, const std::uint32_t* begin, const std
         const float cx = ball.x - static_cast<float>(leaf[0]),
                     cy = ball.y - static_cast<float>(leaf[1]),
                     cz = ball.z - static_cast<float>(leaf[2]), r = ball.r;
-        const V8 dx = kZ - cx, dy = kZ - cy, dz = kZ - cz, dx2 = dx * dx, dy2 = dy * dy,
-                 z2 = dz * dz;
-        float yz2[64];
-        for (int y = 0; y < 8; ++y)
-            store(yz2 + 8 * y, z2 + dy2[y]);
-        // Only rows that can gain by it. The margin is beyond what rounding does: leaving a row out
-        // changes no bit.
-        const float reach = r - least + kMargin;
-        V8 rest = reach * reach - dx2, reach_y;
-        const Lanes empty = rest < kZero;
-        rest = empty ? kZero : rest;
+        const V8 dx = kZ - cx, dy = kZ - cy, dz = kZ - cz;
+        const BallLeaf in_leaf{r, dx * dx, dy * dy, dz * dz};
+        // Small balls reach little of a leaf. A piece counts if its voxel nearest to the ball may
+        // gain by it; the margin is beyond what rounding does: leaving one out changes no bit.
+        const float reach = r - least + kMargin, reach2 = reach > 0 ? reach * reach : 0;
+        const V8 off_y = outside(kPieceY, kPieceY + 1.f, cy),
+                 off_z = outside(kPieceZ, kPieceZ + 3.f, cz), near2 = off_y * off_y + off_z * off_z;
+        Lanes bits = {};
         for (int x = 0; x < 8; ++x)
-            reach_y[x] = std::sqrt(rest[x]);
-        V8 from = cy - reach_y, to = cy + reach_y;
-        from = from < kZero ? kZero : from;
-        to = to > kLast ? kLast : to;
-        Lanes y0 = __builtin_convertvector(from, Lanes), y1 = __builtin_convertvector(to, Lanes);
-        y0 -= __builtin_convertvector(y0, V8) < from; // rounded up
-        y1 = empty ? Lanes{} - 1 : y1;
-        for (int x = 0; x < 8; ++x) {
-            float* slab = values + x * 64;
-            for (int y = y0[x] & ~1; y <= y1[x]; y += 2) { // two rows at a time
-                const V16 old = load_pair(slab + 8 * y);
-                V16 d = load_pair(yz2 + 8 * y) + dx2[x];
-                for (int i = 0; i < 16; ++i)
-                    d[i] = std::sqrt(d[i]);
-                d = r - d;
-                store_pair(slab + 8 * y, d > old ? d : old);
-            }
-        }
+            bits |= (near2 + in_leaf.dx2[x] < reach2) & 1 << x;
+        const std::uint64_t pieces = bytes_of(bits);
+        if (~pieces == 0)
+            subtract_everywhere(in_leaf, values);
+        else
+            subtract_in(pieces, in_leaf, values);
     }
 }
 

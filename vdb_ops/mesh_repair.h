@@ -1,4 +1,5 @@
 #pragma once
+#include <cstddef>
 #include <cstdint>
 #include <optional>
 #include <vector>
@@ -17,6 +18,11 @@ struct RepairedMesh {
     std::vector<std::uint32_t> shell_of; ///< one per triangle
     std::vector<double> cap_area_m2;     ///< one per shell
     MeshDiagnosis diagnosis;             ///< all but what is said of shells and areas
+
+    /// Those that are no caps.
+    std::vector<Triangle> given() const {
+        return {triangles.begin(), triangles.begin() + static_cast<std::ptrdiff_t>(n_given)};
+    }
 };
 
 /// Weld positions, drop faces that are bad or given again, turn neighbours to one side, and close

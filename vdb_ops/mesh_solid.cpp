@@ -11,6 +11,7 @@
 #include "vdb_ops/placed_level_set_field.h"
 #include "vdb_ops/voxelize.h"
 #include "vdb_ops/winding_solid_detail.h"
+#include "vdb_ops/winding_survey_detail.h"
 
 namespace taihu {
 namespace {
@@ -25,7 +26,7 @@ MeshSolid solid_of(ClosedMesh closed) {
 
 /// Signs and measures of what the winding number makes of a mesh.
 MeshDiagnosis survey(const RepairedMesh& mesh, const std::string& where) {
-    constexpr double kMostUndecided = 1;
+    constexpr double kMostUndecided = 1, kLeastParting = 0.6;
     MeshDiagnosis d = mesh.diagnosis;
     const WindingSurvey seen = survey_winding(mesh);
     if (seen.n_inside == 0)
@@ -33,14 +34,19 @@ MeshDiagnosis survey(const RepairedMesh& mesh, const std::string& where) {
                                           ": no inside: the winding number is nowhere above "
                                           "1/2; give the mesh a thickness, or try --close plane");
     d.undecided = double(seen.n_undecided) / double(seen.n_inside);
-    if (d.undecided > kMostUndecided) {
-        char ratio[32];
-        std::snprintf(ratio, sizeof ratio, "%.1f", d.undecided);
-        throw Error(Fault::bad_input,
-                    where + ": no inside: " + ratio +
-                        " times as many places are neither in nor out as are inside (1 at most); "
-                        "give the mesh a thickness, or try --close plane");
-    }
+    const auto refuse = [&](double figure, const char* says) {
+        char text[32];
+        std::snprintf(text, sizeof text, "%.2g", figure);
+        throw Error(Fault::bad_input, where + ": no inside: " + text + says);
+    };
+    if (d.undecided > kMostUndecided)
+        refuse(d.undecided,
+               " times as many places are neither in nor out as are inside (1 at most); give the "
+               "mesh a thickness, or try --close plane");
+    if (seen.parting < kLeastParting)
+        refuse(seen.parting,
+               " of the area of its faces parts in from out (0.6 at least): they surround "
+               "nothing; drop loose faces, or turn all to one side");
     d.n_solids = 1;
     d.n_inverted = seen.mean < 0;
     for (const double area : mesh.cap_area_m2)
@@ -52,7 +58,8 @@ MeshDiagnosis survey(const RepairedMesh& mesh, const std::string& where) {
 } // namespace
 
 MeshSolid mesh_solid(const TriMesh& mesh, const std::string& where, const CloseSettings& settings,
-                     const Lattice& lattice, Progress* progress) {
+                     const Lattice& lattice, Progress* progress,
+                     std::optional<double> memory_bytes) {
     if (settings.rule != CloseRule::winding)
         return solid_of(close_mesh(mesh, where, settings, progress));
     const RepairedMesh repaired = repair_mesh(mesh, std::nullopt, CloseRule::winding);
@@ -66,7 +73,7 @@ MeshSolid mesh_solid(const TriMesh& mesh, const std::string& where, const CloseS
     solid.diagnosis = survey(repaired, where);
     // The level in openings hardly leaves the box of the faces and their caps.
     solid.box = bounds({repaired.positions, repaired.triangles, {}});
-    refuse_if_too_large(solid.diagnosis.area_m2, solid.box, lattice.voxel_m);
+    refuse_if_too_large(solid.diagnosis.area_m2, solid.box, lattice.voxel_m, memory_bytes);
     solid.field =
         std::make_shared<PlacedLevelSetField>(winding_level_set(repaired, lattice, progress));
     return solid;

@@ -1,5 +1,6 @@
 #pragma once
 #include <memory>
+#include <optional>
 #include <string>
 
 #include <openvdb/openvdb.h>
@@ -16,6 +17,8 @@ struct VoxelizeSettings {
     double voxel_m = 0;       ///< > 0
     float half_width_vox = 3; ///< 2..16
     CloseSettings close = {};
+    std::optional<double> memory_bytes =
+        {}; ///< refuse what would need more [what the machine has left]
 };
 
 struct VoxelizeResult {
@@ -34,10 +37,12 @@ VoxelizeResult voxelize(const TriMesh& mesh, const std::string& where,
 /// \throws Error bad_argument: dim outside 4..65536, or an empty box.
 double voxel_for(const Box& box, int dim);
 
-/// Refuse what cannot fit before any work: a level set of `area_m2` at `voxel_m`, and what is made
-/// of it.
+/// Refuse what cannot fit before any work: a level set of `area_m2` at `voxel_m`, written, in
+/// `memory_bytes` or in what the machine has left. Area 0: unknown, only the voxels are counted.
 ///
-/// \throws Error unsupported: `refused: ...`, with what it would need and the voxel size that fits.
-void refuse_if_too_large(double area_m2, const Box& box, double voxel_m);
+/// \throws Error bad_argument: fewer than 4 voxels along the longest axis; unsupported: more than
+///   65536, or as refuse_if_over().
+void refuse_if_too_large(double area_m2, const Box& box, double voxel_m,
+                         std::optional<double> memory_bytes = std::nullopt);
 
 } // namespace taihu

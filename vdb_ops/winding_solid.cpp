@@ -29,11 +29,6 @@ Vec3 place(const Coord& c) {
     return {double(c.x()), double(c.y()), double(c.z())};
 }
 
-std::vector<Triangle> given_faces(const RepairedMesh& mesh) {
-    return {mesh.triangles.begin(),
-            mesh.triangles.begin() + static_cast<std::ptrdiff_t>(mesh.n_given)};
-}
-
 bool is_inside(double winding) {
     return std::fabs(winding) > 0.5;
 }
@@ -51,7 +46,7 @@ public:
                     throw Error(Fault::bad_argument,
                                 "voxelize: a mesh more than 2^20 voxels from the origin cannot be "
                                 "closed by its winding number; use a larger voxel, or move it");
-        faces_ = given_faces(mesh);
+        faces_ = mesh.given();
         face_winding_ = std::make_unique<WindingTree>(points_, faces_);
         for (std::size_t f = mesh.n_given; f < mesh.triangles.size(); ++f) {
             const Triangle& t = mesh.triangles[f];
@@ -468,33 +463,6 @@ private:
 openvdb::FloatGrid::Ptr winding_level_set(const RepairedMesh& mesh, const Lattice& lattice,
                                           Progress* progress) {
     return WindingSolid(mesh, lattice).run(progress);
-}
-
-WindingSurvey survey_winding(const RepairedMesh& mesh) {
-    constexpr std::size_t kPlaces = 27; // along each axis: 19,683
-    const std::vector<Triangle> faces = given_faces(mesh);
-    const Box box = bounds({mesh.positions, faces, {}});
-    const WindingTree tree(mesh.positions, faces);
-    std::array<WindingSurvey, kPlaces> layers;
-    tbb::parallel_for(std::size_t{0}, kPlaces, [&](std::size_t i) {
-        const Vec3 step = box.size() / double(kPlaces);
-        for (std::size_t j = 0; j < kPlaces; ++j)
-            for (std::size_t k = 0; k < kPlaces; ++k) {
-                const double w =
-                    tree.at(box.lo + Vec3{step.x * (double(i) + 0.5), step.y * (double(j) + 0.5),
-                                          step.z * (double(k) + 0.5)});
-                layers[i].n_inside += is_inside(w);
-                layers[i].n_undecided += std::fabs(w - std::round(w)) > 0.25;
-                layers[i].mean += w;
-            }
-    });
-    WindingSurvey all;
-    for (const WindingSurvey& layer : layers) {
-        all.n_inside += layer.n_inside;
-        all.n_undecided += layer.n_undecided;
-        all.mean += layer.mean / double(kPlaces * kPlaces * kPlaces);
-    }
-    return all;
 }
 
 } // namespace taihu

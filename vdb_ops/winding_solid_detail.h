@@ -25,12 +25,4 @@ namespace taihu {
 openvdb::FloatGrid::Ptr winding_level_set(const RepairedMesh& mesh, const Lattice& lattice,
                                           Progress* progress = nullptr);
 
-/// What the winding number says of a mesh, at 27^3 places of its box.
-struct WindingSurvey {
-    std::size_t n_inside = 0;    ///< |w| > 1/2
-    std::size_t n_undecided = 0; ///< farther than 1/4 from a whole number
-    double mean = 0;             ///< below 0: faces point inwards
-};
-WindingSurvey survey_winding(const RepairedMesh& mesh);
-
 } // namespace taihu

@@ -1,9 +1,15 @@
 // Mesh to level set and carving, beside OpenVDB's own route: processor seconds, medians of five
 // (fewer where no bar is set), both sides in turn and compiled with the same flags.
+// Without arguments all tables, otherwise those named.
+#include <algorithm>
 #include <cmath>
 #include <cstring>
+#include <functional>
 #include <optional>
 #include <span>
+#include <string>
+#include <utility>
+#include <vector>
 
 #include <fmt/core.h>
 #include <spawn.h>
@@ -117,26 +123,24 @@ void naive_table() {
 }
 
 /// Processor time per leaf of the result, so of the surface that survives.
-void leaf_table() {
+void leaf_table(int dim) {
     fmt::print("\nmicroseconds per leaf of the result (bar: within 2x of 1000 holes)\n");
-    for (const int dim : {512, 1024}) {
-        const auto base = base_at(dim);
-        double first = 0;
-        for (const int n : {1000, 10'000, 100'000, 1'000'000}) {
-            const std::vector<Sphere> holes = some_holes(n);
-            std::size_t n_leaves = 0;
-            std::vector<double> times;
-            for (int run = 0; run < 3; ++run) {
-                const double start = processor_s();
-                n_leaves = carve(*base, holes).rock->tree().leafCount();
-                times.push_back(processor_s() - start);
-            }
-            const double each = 1e6 * median(times) / static_cast<double>(n_leaves);
-            first = n == 1000 ? each : first;
-            fmt::print("{:>5} {:>8} holes {:>8} leaves {:>6.2f} us {:>5.2f}x {}\n", dim, n,
-                       n_leaves, each, each / first, verdict(each <= 2 * first));
-            std::fflush(stdout);
+    const auto base = base_at(dim);
+    double first = 0;
+    for (const int n : {1000, 10'000, 100'000, 1'000'000}) {
+        const std::vector<Sphere> holes = some_holes(n);
+        std::size_t n_leaves = 0;
+        std::vector<double> times;
+        for (int run = 0; run < 3; ++run) {
+            const double start = processor_s();
+            n_leaves = carve(*base, holes).rock->tree().leafCount();
+            times.push_back(processor_s() - start);
         }
+        const double each = 1e6 * median(times) / static_cast<double>(n_leaves);
+        first = n == 1000 ? each : first;
+        fmt::print("{:>5} {:>8} holes {:>8} leaves {:>6.2f} us {:>5.2f}x {}\n", dim, n, n_leaves,
+                   each, each / first, verdict(each <= 2 * first));
+        std::fflush(stdout);
     }
 }
 
@@ -265,14 +269,20 @@ int main(int argc, char** argv) {
     if (argc == 3 && std::strcmp(argv[1], "--side") == 0)
         return run_side(argv[2]);
     try {
-        memory_table();
-        voxelize_table();
-        constexpr int kBarred[] = {256, 512}, kOthers[] = {128, 1024};
-        carve_table(kBarred, true);
-        naive_table();
-        leaf_table();
-        thesis_table();
-        carve_table(kOthers, false);
+        static constexpr int kBarred[] = {256, 512}, kOthers[] = {128, 1024};
+        const std::pair<std::string, std::function<void()>> tables[] = {
+            {"memory", memory_table},
+            {"voxelize", voxelize_table},
+            {"carve", [] { carve_table(kBarred, true); }},
+            {"naive", naive_table},
+            {"leaves_512", [] { leaf_table(512); }},
+            {"leaves_1024", [] { leaf_table(1024); }},
+            {"thesis", thesis_table},
+            {"others", [] { carve_table(kOthers, false); }}};
+        const std::vector<std::string> asked(argv + 1, argv + argc);
+        for (const auto& [name, table] : tables)
+            if (asked.empty() || std::find(asked.begin(), asked.end(), name) != asked.end())
+                table();
         return 0;
     } catch (const std::exception& e) {
         fmt::print(stderr, "solids_bench: {}\n", e.what());

@@ -69,12 +69,19 @@ TEST(TileCommands, HolesCarvedInTilesAreThoseOfTheWhole) {
 TEST(TileCommands, WhatDoesNotFitIsRefusedWithTheVoxelThatDoes) {
     const Scratch folder;
     must("taihu shape sphere --dim 300 -o base.vdb -q", folder);
+    must("taihu shape sphere -o base.ply -q", folder);
+    must("taihu shape sphere -o open.obj -q", folder); // and without its last face
+    std::string open = read_file(folder / "open.obj");
+    open.resize(open.rfind("f "));
+    write_file(folder / "open.obj", open);
     write_file(folder / "holes.csv", "x_m,y_m,z_m,radius_m\n0.4,0.1,0,0.15\n");
     write_file(folder / "r.json",
                R"({"taihu_recipe": 1, "dim": 300, "solid": {"sphere": {"size_m": [1, 1, 1]}}})");
     for (const std::string command :
          {"taihu rock r.json -o a.vdb", "taihu carve base.vdb --holes holes.csv -o a.vdb",
-          "taihu shape sphere --dim 300 -o a.vdb"}) {
+          "taihu carve base.ply --dim 300 --holes holes.csv -o a.vdb",
+          "taihu shape sphere --dim 300 -o a.vdb", "taihu voxelize base.ply --dim 300 -o a.vdb",
+          "taihu voxelize open.obj --close winding --dim 300 -o a.vdb"}) {
         const Finished refused = run(command + " -q --memory 60MB", folder.path());
         EXPECT_EQ(refused.exit_code, 1) << command;
         EXPECT_THAT(refused.err, HasSubstr("refused: voxel size 0.00333 m would need about"));

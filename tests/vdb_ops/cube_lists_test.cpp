@@ -34,7 +34,7 @@ std::pair<double, double> reach(const Vec3& p, int i, int j, int k) {
 TEST(CubeLists, HoldTheBallsWhoseBandsMeetACubeThatNoBallCovers) {
     constexpr std::uint32_t kBalls = 60;
     CubeLists lists(kSize, kCubes, kWidth);
-    std::vector<CubeLists::Hit> hits;
+    CubeLists::Hits hits;
     for (std::uint32_t b = 0; b < kBalls; ++b)
         lists.find(some_ball(b), b, hits);
     lists.sort({&hits, 1});

@@ -4,12 +4,15 @@
 
 #include <tbb/global_control.h>
 
+#include "stats/core/rng.h"
 #include "tests/support/cube_mesh.h"
 #include "tests/support/errors.h"
 #include "tests/support/grids.h"
 #include "tests/support/mesh_oracle.h"
+#include "vdb_ops/mesh_repair.h"
 #include "vdb_ops/volume.h"
 #include "vdb_ops/voxelize.h"
+#include "vdb_ops/winding_survey_detail.h"
 
 namespace taihu {
 namespace {
@@ -119,6 +122,48 @@ TEST(MeshSolid, WindingRefusesSheetsByName) {
         voxelize(faces_where(ball(), [](const Vec3& p) { return p.y > 0.47; }), "cap",
                  {.voxel_m = 0.01, .close = kWinding});
     });
+}
+
+/// Triangles at random places of the unit box, corners up to `size` from there.
+TriMesh loose_triangles(std::uint32_t n, double size) {
+    const Rng rng{11, 2};
+    TriMesh mesh;
+    for (std::uint32_t i = 0; i < n; ++i) {
+        const Vec3 c{rng.uniform(i, 0), rng.uniform(i, 1), rng.uniform(i, 2)};
+        for (std::uint32_t k = 3; k < 12; k += 3)
+            mesh.positions.push_back(c + Vec3{rng.uniform(i, k) - 0.5, rng.uniform(i, k + 1) - 0.5,
+                                              rng.uniform(i, k + 2) - 0.5} *
+                                             (2 * size));
+        mesh.triangles.push_back({3 * i, 3 * i + 1, 3 * i + 2});
+    }
+    return mesh;
+}
+
+TEST(MeshSolid, WindingRefusesLooseTrianglesAndTakesScansWithFacesMissing) {
+    const auto parting = [](const TriMesh& mesh) {
+        return survey_winding(repair_mesh(mesh, std::nullopt, CloseRule::winding)).parting;
+    };
+    for (const double size : {0.1, 0.3, 1.0})
+        EXPECT_LT(parting(loose_triangles(300, size)), 0.5) << size;
+    // So many large ones that most places are in or out by whole numbers.
+    expect_error(Fault::bad_input, "of the area of its faces parts in from out", [] {
+        mesh_solid(loose_triangles(1000, 1), "soup", kWinding, {1.0 / 40, {}, 3});
+    });
+    // Two open balls, one of them turned inwards: each has its side.
+    TriMesh balls = faces_where(ball(), [](const Vec3&p) { return p.y < 0.35; }), second = balls;
+    flip(second);
+    for (Vec3& p : second.positions)
+        p.x += 2;
+    append(balls, second);
+    EXPECT_GT(parting(balls), 0.95);
+    for (const double missing : {0.1, 0.2, 0.3}) {
+        std::uint64_t face = 0;
+        const TriMesh scan = faces_where(ball(), [&](const Vec3&) {
+            return Rng{12, 2}.uniform(face++, 0) >= missing;
+        });
+        EXPECT_GT(parting(scan), 0.95) << missing;
+        EXPECT_NO_THROW(mesh_solid(scan, "scan", kWinding, {1.0 / 10, {}, 3})) << missing;
+    }
 }
 
 TEST(MeshSolid, PlaneMakesARaggedBottomFlatAndCutsNothingAway) {

@@ -22,7 +22,7 @@ TEST(Voxelize, VoxelForPutsDimVoxelsAlongTheLongestAxis) {
 
 TEST(Voxelize, RefusesWhatCannotFitBeforeItStarts) {
     const TriMesh mesh = shape_mesh({.subdivisions = 2});
-    expect_error(Fault::unsupported, "refused: voxel size 1e-06 m would need about",
+    expect_error(Fault::unsupported, "refused: voxel size 1.00e-06 m would need about",
                  [&] { voxelize(mesh, "boulder", {.voxel_m = 1e-6}); });
     expect_error(Fault::unsupported, "smallest that fits",
                  [&] { voxelize(mesh, "boulder", {.voxel_m = 1e-6}); });
