@@ -37,7 +37,7 @@ public:
         : balls_(balls), origin_(region.lo), reach_m_(reach_m), grid_(region, reach_m),
           // Lists are of lattice points: those between are within sqrt(3) of one.
           cells_(kCell, grid_.n, reach_m / grid_.unit_m + 1.8) {
-        std::vector<CubeLists::Hit> hits;
+        CubeLists::Hits hits;
         for (std::size_t i = 0; i < balls.size(); ++i)
             cells_.find(
                 {(balls[i].center - origin_) / grid_.unit_m, balls[i].radius_m / grid_.unit_m},
