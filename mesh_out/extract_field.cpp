@@ -45,11 +45,13 @@ public:
 
     LabelledMesh& mesh() { return mesh_; }
 
-    void find_crossings_of(const KnownCrossings& known) {
+    void find_crossings() {
         const auto& edges = surface_.edges();
         crossings_.resize(edges.size());
         each(edges.size(), points_, progress_, [&](const SurfacePoints& points, std::size_t i) {
-            crossings_[i] = crossing_on(blocks_, points, known, edges[i].block, edges[i].key);
+            crossings_[i] = points.on_edge(
+                blocks_[edges[i].block].origin + CellBlocks::local(edges[i].key % 512),
+                edges[i].key / 512);
         });
         const auto& polygons = surface_.polygons();
         first_.assign(surface_.n_vertices() + 1, 0);
@@ -91,7 +93,7 @@ public:
     /// that cannot be helped so are returned.
     std::vector<std::uint32_t> retreat() {
         constexpr int kMostRounds = 16;
-        std::vector<std::uint8_t> picked(mesh_.triangles.size(), 1);
+        std::vector<std::uint8_t> picked = risky();
         std::vector<std::uint32_t> hit;
         for (int round = 0; round < kMostRounds; ++round) {
             std::vector<std::uint32_t> polygons; // that change
@@ -126,6 +128,42 @@ private:
         for (const std::uint32_t p : polygons)
             for (auto t = first_triangle_[p]; t < first_triangle_[p + 1]; ++t)
                 picked[t] = 1;
+    }
+
+    /// Triangles that may cross others: those with corners that left their cells or on edges within
+    /// one primitive, and those round
+    /// a triangle that is not of one primitive with its edge, does not face as that does, or has
+    /// all corners on one rim.
+    std::vector<std::uint8_t> risky() const {
+        constexpr double kUpright = 0.5; // cosine of 60 degrees
+        std::vector<std::uint8_t> astray(mesh_.positions.size()), risk(mesh_.triangles.size());
+        tbb::parallel_for(std::size_t{0}, astray.size(), [&](std::size_t v) {
+            astray[v] =
+                !cell_box(v).contains(mesh_.positions[v]) || !is_smooth(crossings_of(v));
+        });
+        tbb::parallel_for(std::size_t{0}, crossings_.size(), [&](std::size_t i) {
+            const Crossing& c = crossings_[i];
+            for (auto t = first_triangle_[i]; t < first_triangle_[i + 1]; ++t) {
+                const Triangle& corners = mesh_.triangles[t];
+                const auto label = [&](std::size_t k) { return mesh_.labels[corners[k]]; };
+                const Vec3 a = mesh_.positions[corners[0]], b = mesh_.positions[corners[1]],
+                           d = mesh_.positions[corners[2]], n = cross(b - a, d - a);
+                risk[t] = !c.known || is_needle(corners) ||
+                          !(dot(n, c.normal) > kUpright * length(n)) ||
+                          label(0).common(label(1)).common(label(2)).size() > 1;
+                for (const std::uint32_t v : corners)
+                    risk[t] = risk[t] || !mesh_.labels[v].has(c.primitive);
+            }
+        });
+        for (std::size_t t = 0; t < risk.size(); ++t)
+            if (risk[t])
+                for (const std::uint32_t v : mesh_.triangles[t])
+                    astray[v] = 1;
+        tbb::parallel_for(std::size_t{0}, risk.size(), [&](std::size_t t) {
+            for (const std::uint32_t v : mesh_.triangles[t])
+                risk[t] = risk[t] || astray[v];
+        });
+        return risk;
     }
 
     /// Good until the same thread asks again.
@@ -276,11 +314,8 @@ private:
     std::vector<std::uint32_t> in_trouble(const std::vector<std::uint8_t>& picked,
                                           std::vector<std::uint32_t>& turned) {
         std::vector<std::uint32_t> hit;
-        std::vector<char> needle(mesh_.triangles.size());
-        tbb::parallel_for(std::size_t{0}, needle.size(),
-                          [&](std::size_t t) { needle[t] = is_needle(mesh_.triangles[t]); });
-        for (std::size_t t = 0; t < needle.size(); ++t)
-            if (needle[t])
+        for (std::size_t t = 0; t < picked.size(); ++t)
+            if (picked[t] && is_needle(mesh_.triangles[t]))
                 add_movable({&mesh_.triangles[t], 1}, hit);
         for (const auto& pair : crossing_pairs(mesh_.positions, mesh_.triangles, picked))
             if (!untangle({pair.first, pair.second}, turned))
@@ -393,13 +428,13 @@ LabelledMesh extract(const openvdb::FloatGrid& solid, const Field* field,
     const SurfacePoints points(solid, *probe, lattice);
     SmallCells small;
     for (int attempt = 0; attempt < kMostAttempts; ++attempt) {
-        const KnownCrossings known = choose_cell_sizes(
-            blocks, points, {settings.most_spacing, settings.bound_vox}, small, progress);
+        choose_cell_sizes(blocks, solid, {settings.most_spacing, settings.bound_vox}, small,
+                          progress);
         const DualSurface surface(blocks, points);
         if (!in_band(blocks, surface, solid))
             refuse_clipped(solid);
         Mesher mesher(blocks, surface, points, progress);
-        mesher.find_crossings_of(known);
+        mesher.find_crossings();
         mesher.place();
         mesher.split_all();
         const std::vector<std::uint32_t> stuck = mesher.retreat();

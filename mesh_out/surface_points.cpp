@@ -9,6 +9,7 @@ namespace {
 
 // In voxels.
 constexpr double kOnEdge = 1e-4, kOnSurface = 1e-3, kNearEnough = 0.05, kFarthest = 4;
+constexpr double kBesideEdge = 0.02, kMostStep = 0.05; // what a tangent is good for
 // Normals of one primitive that differ by more than 40 degrees in a cell: it has edges of its own.
 constexpr double kSmoothCosine = 0.77;
 
@@ -49,6 +50,8 @@ std::optional<Vec3> nearest_to_planes(std::span<const Crossing> crossings, const
     return mean + *step;
 }
 
+} // namespace
+
 bool is_smooth(std::span<const Crossing> crossings) {
     for (std::size_t i = 0; i < crossings.size(); ++i)
         for (std::size_t k = i + 1; k < crossings.size(); ++k)
@@ -57,8 +60,6 @@ bool is_smooth(std::span<const Crossing> crossings) {
                 return false;
     return true;
 }
-
-} // namespace
 
 Vec3 held(const Vec3& p, const Box& box) {
     return max(box.lo, min(box.hi, p));
@@ -90,9 +91,17 @@ Crossing SurfacePoints::on_edge(const openvdb::Coord& at, int axis) const {
             i % 3 == 2 ? 0.5 * (t0 + t1) : t0 + (t1 - t0) * std::clamp(f0 / (f0 - f1), 0.02, 0.98);
         const Vec3 p = p0 + way * t;
         const FieldProbe::Nearest f = field_.at(p);
-        if (std::fabs(f.value_m) <= kOnEdge * lattice_.voxel_m) {
+        if (std::fabs(f.value_m) <= kBesideEdge * lattice_.voxel_m) {
+            // So near, its primitive alone says the rest.
             const FieldProbe::Value v = field_.of(f.primitive, p);
-            return {p, normalized(v.gradient), f.primitive, true};
+            const double slope = length(v.gradient), by = -v.value_m / v.gradient[axis];
+            if (std::fabs(by) <= kMostStep * lattice_.voxel_m && t * lattice_.voxel_m + by >= 0 &&
+                t * lattice_.voxel_m + by <= lattice_.voxel_m) {
+                c.point[axis] = p[axis] + by;
+                return {c.point, v.gradient / slope, f.primitive, true};
+            }
+            if (std::fabs(f.value_m) <= kOnEdge * lattice_.voxel_m)
+                return {p, normalized(v.gradient), f.primitive, true};
         }
         if ((f.value_m < 0) == starts_inside) {
             t0 = t;
@@ -139,6 +148,9 @@ LabelledPoint SurfacePoints::place(std::span<const Crossing> crossings, const Bo
             if (std::fabs(field_.at(in).value_m) <= 0.1 * lattice_.voxel_m)
                 return {in, set};
         }
+    } else if (set.size() == 1) {
+        if (const auto p = beside(set[0], mean); p && cell.dilated(slack_m).contains(*p))
+            return {*p, set};
     }
     if (all_in)
         if (const auto found = settle(set, mean, cell, slack_m))
@@ -146,6 +158,16 @@ LabelledPoint SurfacePoints::place(std::span<const Crossing> crossings, const Bo
     if (const auto found = on_rim(set, mean, cell))
         return *found;
     return on_face(mean, cell);
+}
+
+std::optional<Vec3> SurfacePoints::beside(Primitive primitive, const Vec3& p) const {
+    const FieldProbe::Value from = field_.of(primitive, p);
+    const Vec3 way = from.gradient / length_squared(from.gradient);
+    const Vec3 near = p - way * from.value_m;
+    const double left_m = field_.at(near).value_m;
+    if (!(std::fabs(left_m) <= kOnSurface * lattice_.voxel_m))
+        return std::nullopt;
+    return near - way * left_m;
 }
 
 std::optional<LabelledPoint> SurfacePoints::on_rim(const PrimitiveSet& set, const Vec3& from,

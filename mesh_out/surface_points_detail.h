@@ -52,6 +52,9 @@ public:
     bool joins(const std::array<openvdb::Coord, 4>& corners) const;
 
 private:
+    /// The nearest point of one primitive, from near it: two steps; none where it is not that of
+    /// the field.
+    std::optional<Vec3> beside(Primitive primitive, const Vec3& p) const;
     std::optional<LabelledPoint> settle(PrimitiveSet set, const Vec3& from, const Box& cell,
                                         double slack_m) const;
     /// The nearest rim in the cell, of three primitives.
@@ -70,5 +73,7 @@ private:
 /// `p` held to a box.
 Vec3 held(const Vec3& p, const Box& box);
 Vec3 mean_of(std::span<const Crossing> crossings);
+/// Whether no primitive among them turns so much that it has an edge of its own.
+bool is_smooth(std::span<const Crossing> crossings);
 
 } // namespace taihu
