@@ -22,7 +22,8 @@ public:
         for (std::size_t i = 0; i < 3; ++i)
             for (std::size_t j = 0; j < 3; ++j)
                 for (std::size_t k = 0; k < 3; ++k) {
-                    const Coord at = origin.offsetBy(int(i) * 8 - 8, int(j) * 8 - 8, int(k) * 8 - 8);
+                    const Coord at =
+                        origin.offsetBy(int(i) * 8 - 8, int(j) * 8 - 8, int(k) * 8 - 8);
                     const auto* leaf = tree.probeConstLeaf(at);
                     const float* values = leaf ? leaf->buffer().data() : nullptr;
                     const float tile = leaf ? 0 : tree.getValue(at);
@@ -122,8 +123,8 @@ void join(CellBlock& block, std::uint32_t number, const Bends& bends,
         std::uint64_t parts = 0;
         float bend = 0;
         for (int k = 0; k < 8; ++k) {
-            const int part = ((c.x() / 2 + (k >> 2)) * 4 + c.y() / 2 + (k >> 1 & 1)) * 4 +
-                             c.z() / 2 + (k & 1);
+            const int part =
+                ((c.x() / 2 + (k >> 2)) * 4 + c.y() / 2 + (k >> 1 & 1)) * 4 + c.z() / 2 + (k & 1);
             parts |= std::uint64_t{1} << part;
             bend = std::max(bend, bends[static_cast<std::size_t>(part)]);
         }

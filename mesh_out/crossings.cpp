@@ -324,9 +324,8 @@ public:
             });
     }
     bool meets(const Box& box) const {
-        return BoxTree::overlap(box, all_) && each_part(box, [&](std::size_t i) {
-                   return (bits_[i / 64] >> (i % 64) & 1) != 0;
-               });
+        return BoxTree::overlap(box, all_) &&
+               each_part(box, [&](std::size_t i) { return (bits_[i / 64] >> (i % 64) & 1) != 0; });
     }
 
 private:

@@ -49,9 +49,9 @@ public:
         const auto& edges = surface_.edges();
         crossings_.resize(edges.size());
         each(edges.size(), points_, progress_, [&](const SurfacePoints& points, std::size_t i) {
-            crossings_[i] = points.on_edge(
-                blocks_[edges[i].block].origin + CellBlocks::local(edges[i].key % 512),
-                edges[i].key / 512);
+            crossings_[i] = points.on_edge(blocks_[edges[i].block].origin +
+                                               CellBlocks::local(edges[i].key % 512),
+                                           edges[i].key / 512);
         });
         const auto& polygons = surface_.polygons();
         first_.assign(surface_.n_vertices() + 1, 0);
@@ -83,8 +83,6 @@ public:
         for (std::size_t i = 0; i < surface_.polygons().size(); ++i)
             first_triangle_[i + 1] = first_triangle_[i] + surface_.polygons()[i].n - 2u;
         mesh_.triangles.resize(first_triangle_.back());
-        split_first_.assign(surface_.polygons().size(), 0);
-        turned_.assign(surface_.polygons().size(), 0);
         each(surface_.polygons().size(), points_, progress_,
              [&](const SurfacePoints& points, std::size_t i) { split(points, i); });
     }
@@ -96,19 +94,13 @@ public:
         std::vector<std::uint8_t> picked = risky();
         std::vector<std::uint32_t> hit;
         for (int round = 0; round < kMostRounds; ++round) {
-            std::vector<std::uint32_t> polygons; // that change
-            hit = in_trouble(picked, polygons);
-            if (hit.empty() && polygons.empty())
+            hit = in_trouble(picked);
+            if (std::all_of(hit.begin(), hit.end(),
+                            [&](std::uint32_t v) { return stage_[v] >= kLastStage; }))
                 break;
-            if (polygons.empty() && std::all_of(hit.begin(), hit.end(), [&](std::uint32_t v) {
-                    return stage_[v] >= kLastStage;
-                }))
-                break;
-            std::fill(picked.begin(), picked.end(), 0);
-            pick(polygons, picked);
-            polygons.clear();
             each(hit.size(), points_, progress_,
                  [&](const SurfacePoints& points, std::size_t i) { step_back(points, hit[i]); });
+            std::vector<std::uint32_t> polygons; // that change
             for (const std::uint32_t v : hit)
                 polygons.insert(polygons.end(), around_.begin() + first_[v],
                                 around_.begin() + first_[v + 1]);
@@ -116,19 +108,16 @@ public:
             polygons.erase(std::unique(polygons.begin(), polygons.end()), polygons.end());
             each(polygons.size(), points_, progress_,
                  [&](const SurfacePoints& points, std::size_t i) { split(points, polygons[i]); });
-            pick(polygons, picked);
+            std::fill(picked.begin(), picked.end(), 0);
+            for (const std::uint32_t p : polygons)
+                for (auto t = first_triangle_[p]; t < first_triangle_[p + 1]; ++t)
+                    picked[t] = 1;
         }
         return hit;
     }
 
 private:
-    static constexpr std::uint8_t kLastStage = 3;
-
-    void pick(const std::vector<std::uint32_t>& polygons, std::vector<std::uint8_t>& picked) const {
-        for (const std::uint32_t p : polygons)
-            for (auto t = first_triangle_[p]; t < first_triangle_[p + 1]; ++t)
-                picked[t] = 1;
-    }
+    static constexpr std::uint8_t kOutside = 3, kLastStage = 5;
 
     /// Triangles that may cross others: those with corners that left their cells or on edges within
     /// one primitive, and those round
@@ -138,8 +127,7 @@ private:
         constexpr double kUpright = 0.5; // cosine of 60 degrees
         std::vector<std::uint8_t> astray(mesh_.positions.size()), risk(mesh_.triangles.size());
         tbb::parallel_for(std::size_t{0}, astray.size(), [&](std::size_t v) {
-            astray[v] =
-                !cell_box(v).contains(mesh_.positions[v]) || !is_smooth(crossings_of(v));
+            astray[v] = !cell_box(v).contains(mesh_.positions[v]) || !is_smooth(crossings_of(v));
         });
         tbb::parallel_for(std::size_t{0}, crossings_.size(), [&](std::size_t i) {
             const Crossing& c = crossings_[i];
@@ -183,84 +171,40 @@ private:
         return box;
     }
 
-    /// Into the cell, if it is outside; off the rim; to the middle of the crossings.
+    /// Aside of a rim, first: where a solid is a fin, cells on both sides of its edge take the same
+    /// stretch of that, and a little is enough to part them. Then into the cell, if it is outside;
+    /// off the rim; to the middle of the crossings.
     void step_back(const SurfacePoints& points, std::uint32_t v) {
+        static constexpr std::array<double, 2> kAside = {0.05, 0.2}; // of the way to the crossings
         const Box cell = cell_box(v);
-        LabelledPoint p{mesh_.positions[v], mesh_.labels[v]};
-        if (stage_[v] == 0 && !cell.contains(p.point)) {
-            stage_[v] = 1;
-            p = points.back_in(p, cell);
-        } else if (const Vec3 mean = mean_of(crossings_of(v));
-                   stage_[v] < 2 && p.labels.size() > 1) {
-            stage_[v] = 2;
-            p = points.on_face(mean, cell);
-        } else {
-            stage_[v] = kLastStage;
-            p = {mean, points.label(mean)};
+        const auto crossings = crossings_of(v);
+        const Vec3 mean = mean_of(crossings);
+        const LabelledPoint p{mesh_.positions[v], mesh_.labels[v]};
+        std::optional<LabelledPoint> to;
+        while (!to) {
+            const std::uint8_t stage = stage_[v]++;
+            if (stage < kAside.size())
+                to = points.aside(p, crossings, kAside[stage]);
+            else if (stage == kAside.size() && !cell.contains(p.point))
+                to = points.back_in(p, cell);
+            else if (stage == kAside.size() + 1 && p.labels.size() > 1)
+                to = points.on_face(mean, cell);
+            else if (stage >= kLastStage - 1) {
+                stage_[v] = kLastStage;
+                to = LabelledPoint{mean, points.label(mean)};
+            }
         }
-        mesh_.positions[v] = p.point;
-        mesh_.labels[v] = p.labels;
+        mesh_.positions[v] = to->point;
+        mesh_.labels[v] = to->labels;
     }
 
     void split(const SurfacePoints& points, std::size_t i) {
-        const DualPolygon& polygon = surface_.polygons()[i];
-        write_split(i,
-                    polygon.n == 3 || along_first(points, polygon.vertices, crossings_[i].normal));
-    }
-    void write_split(std::size_t i, bool along_first) {
-        const auto& v = surface_.polygons()[i].vertices;
+        const auto& [v, n] = surface_.polygons()[i];
+        const bool first = n == 3 || along_first(points, v, crossings_[i].normal);
         Triangle* out = &mesh_.triangles[first_triangle_[i]];
-        split_first_[i] = along_first;
-        out[0] = along_first ? Triangle{v[0], v[1], v[2]} : Triangle{v[1], v[2], v[3]};
-        if (surface_.polygons()[i].n == 4)
-            out[1] = along_first ? Triangle{v[0], v[2], v[3]} : Triangle{v[1], v[3], v[0]};
-    }
-
-    /// Splits the quads of two triangles that cross along other diagonals, if that helps; once
-    /// each.
-    bool untangle(const std::array<std::uint32_t, 2>& pair, std::vector<std::uint32_t>& changed) {
-        std::array<std::size_t, 2> of;
-        for (std::size_t k = 0; k < 2; ++k)
-            of[k] = static_cast<std::size_t>(
-                std::upper_bound(first_triangle_.begin(), first_triangle_.end(), pair[k]) -
-                first_triangle_.begin() - 1);
-        const std::array<bool, 2> was = {split_first_[of[0]] != 0, split_first_[of[1]] != 0};
-        const auto may_turn = [&](std::size_t k) {
-            return surface_.polygons()[of[k]].n == 4 && !turned_[of[k]];
-        };
-        for (const unsigned which : {1u, 2u, 3u}) {
-            if ((which & 1 && !may_turn(0)) || (which & 2 && !may_turn(1)) ||
-                (of[0] == of[1] && which != 1))
-                continue;
-            for (std::size_t k = 0; k < 2; ++k)
-                write_split(of[k], was[k] != ((which >> (of[0] == of[1] ? 0 : k) & 1) != 0));
-            if (!cross_each_other(of[0], of[1])) {
-                for (std::size_t k = 0; k < 2; ++k)
-                    turned_[of[k]] = turned_[of[k]] || (which >> k & 1) != 0;
-                changed.insert(changed.end(), of.begin(), of.end());
-                return true;
-            }
-        }
-        for (std::size_t k = 0; k < 2; ++k)
-            write_split(of[k], was[k]);
-        return false;
-    }
-    bool cross_each_other(std::size_t one, std::size_t other) const {
-        std::vector<std::uint32_t> all;
-        for (const std::size_t p : {one, other})
-            for (auto t = first_triangle_[p]; t < first_triangle_[p + 1]; ++t)
-                all.push_back(t);
-        std::sort(all.begin(), all.end());
-        all.erase(std::unique(all.begin(), all.end()), all.end());
-        for (std::size_t i = 0; i < all.size(); ++i) {
-            if (is_needle(mesh_.triangles[all[i]]))
-                return true;
-            for (std::size_t k = i + 1; k < all.size(); ++k)
-                if (!is_needle(mesh_.triangles[all[k]]) &&
-                    faces_cross(mesh_.positions, mesh_.triangles[all[i]], mesh_.triangles[all[k]]))
-                    return true;
-        }
-        return false;
+        out[0] = first ? Triangle{v[0], v[1], v[2]} : Triangle{v[1], v[2], v[3]};
+        if (n == 4)
+            out[1] = first ? Triangle{v[0], v[2], v[3]} : Triangle{v[1], v[3], v[0]};
     }
 
     /// Whether to split a quad from its first corner to the third: along a rim, or so that its
@@ -310,18 +254,14 @@ private:
     }
 
     /// The vertices to move of triangles that cross, have no area, or two vertices in one place.
-    /// \param turned  polygons that were split along their other diagonal instead.
-    std::vector<std::uint32_t> in_trouble(const std::vector<std::uint8_t>& picked,
-                                          std::vector<std::uint32_t>& turned) {
+    std::vector<std::uint32_t> in_trouble(const std::vector<std::uint8_t>& picked) const {
         std::vector<std::uint32_t> hit;
         for (std::size_t t = 0; t < picked.size(); ++t)
             if (picked[t] && is_needle(mesh_.triangles[t]))
                 add_movable({&mesh_.triangles[t], 1}, hit);
         for (const auto& pair : crossing_pairs(mesh_.positions, mesh_.triangles, picked))
-            if (!untangle({pair.first, pair.second}, turned))
-                add_movable(std::array{mesh_.triangles[pair.first], mesh_.triangles[pair.second]},
-                            hit);
-        if (hit.empty() && turned.empty())
+            add_movable(std::array{mesh_.triangles[pair.first], mesh_.triangles[pair.second]}, hit);
+        if (hit.empty())
             hit = in_one_place();
         std::sort(hit.begin(), hit.end());
         hit.erase(std::unique(hit.begin(), hit.end()), hit.end());
@@ -333,7 +273,7 @@ private:
             const std::size_t before = hit.size();
             for (const Triangle& t : triangles)
                 for (const std::uint32_t v : t)
-                    if (all || (stage_[v] == 0 && !cell_box(v).contains(mesh_.positions[v])))
+                    if (all || (stage_[v] < kOutside && !cell_box(v).contains(mesh_.positions[v])))
                         hit.push_back(v);
             return hit.size() > before;
         };
@@ -370,8 +310,6 @@ private:
     std::vector<Crossing> crossings_;           ///< one for each polygon
     std::vector<std::uint32_t> first_, around_; ///< polygons of vertex v
     std::vector<std::uint32_t> first_triangle_; ///< of each polygon
-    std::vector<char> split_first_;             ///< which diagonal polygons are split along
-    std::vector<char> turned_;                  ///< those for which another one was taken
     std::vector<std::uint8_t> stage_;           ///< of retreat
     LabelledMesh mesh_;
 };

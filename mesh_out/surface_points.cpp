@@ -9,7 +9,7 @@ namespace {
 
 // In voxels.
 constexpr double kOnEdge = 1e-4, kOnSurface = 1e-3, kNearEnough = 0.05, kFarthest = 4;
-constexpr double kBesideEdge = 0.02, kMostStep = 0.05; // what a tangent is good for
+constexpr double kBesideEdge = 0.01, kMostStep = 0.05; // what a tangent is good for
 // Normals of one primitive that differ by more than 40 degrees in a cell: it has edges of its own.
 constexpr double kSmoothCosine = 0.77;
 
@@ -152,6 +152,9 @@ LabelledPoint SurfacePoints::place(std::span<const Crossing> crossings, const Bo
         if (const auto p = beside(set[0], mean); p && cell.dilated(slack_m).contains(*p))
             return {*p, set};
     }
+    if (set.size() == 2 && all_in)
+        if (const auto p = between_faces(set, crossings, cell))
+            return {*p, set};
     if (all_in)
         if (const auto found = settle(set, mean, cell, slack_m))
             return *found;
@@ -185,6 +188,81 @@ std::optional<LabelledPoint> SurfacePoints::on_rim(const PrimitiveSet& set, cons
     return best;
 }
 
+std::optional<Vec3> SurfacePoints::between_faces(const PrimitiveSet& set,
+                                                 std::span<const Crossing> crossings,
+                                                 const Box& cell) const {
+    std::array<Vec3, 2> ends;
+    std::size_t n = 0;
+    for (std::size_t i = 0; i < crossings.size(); ++i)
+        for (std::size_t k = i + 1; k < crossings.size(); ++k) {
+            const Crossing &a = crossings[i], &b = crossings[k];
+            if (a.primitive == b.primitive)
+                continue;
+            for (int axis = 0; axis < 3; ++axis) {
+                const double at = a.point[axis];
+                if (at != b.point[axis] || (at != cell.lo[axis] && at != cell.hi[axis]))
+                    continue;
+                const auto p = on_cell_face(a, b, axis, cell);
+                if (!p)
+                    continue;
+                if (n < 2)
+                    ends[n++] = *p;
+                else if (length(*p - ends[0]) > length(ends[1] - ends[0]))
+                    ends[1] = *p;
+            }
+        }
+    if (n < 2)
+        return std::nullopt;
+    const auto p = onto(field_, set, (ends[0] + ends[1]) * 0.5, kFarthest * lattice_.voxel_m);
+    return p && cell.contains(*p) && is_on(*p) ? p : std::nullopt;
+}
+
+std::optional<Vec3> SurfacePoints::on_cell_face(const Crossing& a, const Crossing& b, int axis,
+                                                const Box& cell) const {
+    constexpr double kLeastArea = 0.02; // sine of the angle between the two curves
+    const int u = (axis + 1) % 3, v = (axis + 2) % 3;
+    Vec3 p = (a.point + b.point) * 0.5;
+    p[axis] = a.point[axis];
+    for (int i = 0; i < 8; ++i) {
+        const FieldProbe::Value f = field_.of(a.primitive, p), g = field_.of(b.primitive, p);
+        if (std::max(std::fabs(f.value_m), std::fabs(g.value_m)) <= kOnEdge * lattice_.voxel_m)
+            return cell.contains(p) ? std::optional(p) : std::nullopt;
+        const double area = f.gradient[u] * g.gradient[v] - f.gradient[v] * g.gradient[u];
+        if (!(std::fabs(area) > kLeastArea * length(f.gradient) * length(g.gradient)))
+            return std::nullopt;
+        p[u] -= (f.value_m * g.gradient[v] - g.value_m * f.gradient[v]) / area;
+        p[v] -= (g.value_m * f.gradient[u] - f.value_m * g.gradient[u]) / area;
+        if (!cell.dilated(2 * lattice_.voxel_m).contains(p))
+            return std::nullopt;
+    }
+    return std::nullopt;
+}
+
+std::optional<LabelledPoint> SurfacePoints::aside(const LabelledPoint& p,
+                                                  std::span<const Crossing> crossings,
+                                                  double share) const {
+    std::optional<LabelledPoint> best;
+    std::size_t most = 0;
+    for (const Primitive own : p.labels.all()) {
+        Vec3 sum;
+        std::size_t n = 0;
+        for (const Crossing& c : crossings)
+            if (c.primitive == own) {
+                sum += c.point;
+                ++n;
+            }
+        if (n <= most)
+            continue;
+        const Vec3 to = p.point + (sum / static_cast<double>(n) - p.point) * share;
+        const auto on = onto(field_, PrimitiveSet(own), to, lattice_.voxel_m);
+        if (!on || !is_on(*on))
+            continue;
+        most = n;
+        best = LabelledPoint{*on, PrimitiveSet(own)};
+    }
+    return best;
+}
+
 LabelledPoint SurfacePoints::back_in(const LabelledPoint& p, const Box& cell) const {
     const Vec3 in = held(p.point, cell);
     if (const auto rim = on_rim(p.labels, in, cell))
@@ -208,6 +286,22 @@ std::optional<LabelledPoint> SurfacePoints::settle(PrimitiveSet set, const Vec3&
     return std::nullopt;
 }
 
+Vec3 SurfacePoints::along_rim(const PrimitiveSet& set, const Vec3& p, const Box& cell) const {
+    const double farthest = kFarthest * lattice_.voxel_m;
+    const Vec3 way =
+        normalized(cross(field_.of(set[0], p).gradient, field_.of(set[1], p).gradient));
+    double first = -farthest, last = farthest;
+    for (int axis = 0; axis < 3; ++axis) {
+        if (std::fabs(way[axis]) < 1e-9)
+            continue;
+        const double a = (cell.lo[axis] - p[axis]) / way[axis],
+                     b = (cell.hi[axis] - p[axis]) / way[axis];
+        first = std::max(first, std::min(a, b));
+        last = std::min(last, std::max(a, b));
+    }
+    return p + way * (0.5 * (first + last));
+}
+
 std::optional<Vec3> SurfacePoints::meeting(const PrimitiveSet& set, const Vec3& from,
                                            const Box& cell, double slack_m) const {
     const double farthest = kFarthest * lattice_.voxel_m;
@@ -215,18 +309,7 @@ std::optional<Vec3> SurfacePoints::meeting(const PrimitiveSet& set, const Vec3& 
     auto p = nearest;
     // A rim that passes crossings of both its faces passes the cell: follow it there.
     for (int i = 0; i < 3 && p && set.size() == 2 && !cell.contains(*p); ++i) {
-        const Vec3 way =
-            normalized(cross(field_.of(set[0], *p).gradient, field_.of(set[1], *p).gradient));
-        double first = -farthest, last = farthest;
-        for (int axis = 0; axis < 3; ++axis) {
-            if (std::fabs(way[axis]) < 1e-9)
-                continue;
-            const double a = (cell.lo[axis] - (*p)[axis]) / way[axis],
-                         b = (cell.hi[axis] - (*p)[axis]) / way[axis];
-            first = std::max(first, std::min(a, b));
-            last = std::min(last, std::max(a, b));
-        }
-        const auto next = onto(field_, set, *p + way * (0.5 * (first + last)), farthest);
+        const auto next = onto(field_, set, along_rim(set, *p, cell), farthest);
         if (!next)
             break;
         p = next;

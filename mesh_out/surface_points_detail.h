@@ -41,6 +41,10 @@ public:
     LabelledPoint place(std::span<const Crossing> crossings, const Box& cell, double slack_m) const;
     /// The same without rims: a point of the face at `p`, held to the cell.
     LabelledPoint on_face(const Vec3& p, const Box& cell) const;
+    /// From a point of a rim or a face a share of the way to the crossings of its face that has the
+    /// most of them.
+    std::optional<LabelledPoint> aside(const LabelledPoint& p, std::span<const Crossing> crossings,
+                                       double share) const;
     /// What is left in a cell of a point outside of it: of a corner one of its rims, of others the
     /// face.
     LabelledPoint back_in(const LabelledPoint& p, const Box& cell) const;
@@ -57,9 +61,17 @@ private:
     std::optional<Vec3> beside(Primitive primitive, const Vec3& p) const;
     std::optional<LabelledPoint> settle(PrimitiveSet set, const Vec3& from, const Box& cell,
                                         double slack_m) const;
+    /// The middle of a rim that passes two faces of the cell between crossings.
+    std::optional<Vec3> between_faces(const PrimitiveSet& set, std::span<const Crossing> crossings,
+                                      const Box& cell) const;
+    /// Where the primitives of two crossings in a face of the cell meet in that face.
+    std::optional<Vec3> on_cell_face(const Crossing& a, const Crossing& b, int axis,
+                                     const Box& cell) const;
     /// The nearest rim in the cell, of three primitives.
     std::optional<LabelledPoint> on_rim(const PrimitiveSet& set, const Vec3& from,
                                         const Box& cell) const;
+    /// From a point of a rim along its tangent to the middle of what of that is in the cell.
+    Vec3 along_rim(const PrimitiveSet& set, const Vec3& p, const Box& cell) const;
     /// Where primitives meet, in the cell if they do so there.
     std::optional<Vec3> meeting(const PrimitiveSet& set, const Vec3& from, const Box& cell,
                                 double slack_m) const;
