@@ -117,7 +117,7 @@ public:
     }
 
 private:
-    static constexpr std::uint8_t kOutside = 3, kLastStage = 5;
+    static constexpr std::uint8_t kOutside = 5, kLastStage = 7;
 
     /// Triangles that may cross others: those with corners that left their cells or on edges within
     /// one primitive, and those round
@@ -175,23 +175,22 @@ private:
     /// stretch of that, and a little is enough to part them. Then into the cell, if it is outside;
     /// off the rim; to the middle of the crossings.
     void step_back(const SurfacePoints& points, std::uint32_t v) {
-        static constexpr std::array<double, 2> kAside = {0.05, 0.2}; // of the way to the crossings
+        static constexpr std::array<double, 2> kAside = {0.05, 0.25}; // of the way to the crossings
         const Box cell = cell_box(v);
         const auto crossings = crossings_of(v);
-        const Vec3 mean = mean_of(crossings);
-        const LabelledPoint p{mesh_.positions[v], mesh_.labels[v]};
+        const LabelledPoint start = points.place(crossings, cell, points.voxel_m());
         std::optional<LabelledPoint> to;
         while (!to) {
             const std::uint8_t stage = stage_[v]++;
-            if (stage < kAside.size())
-                to = points.aside(p, crossings, kAside[stage]);
-            else if (stage == kAside.size() && !cell.contains(p.point))
-                to = points.back_in(p, cell);
-            else if (stage == kAside.size() + 1 && p.labels.size() > 1)
-                to = points.on_face(mean, cell);
-            else if (stage >= kLastStage - 1) {
+            if (stage < kOutside - 1)
+                to = points.aside(start, crossings, stage % 2, kAside[stage / 2]);
+            else if (stage == kOutside - 1 && !cell.contains(start.point))
+                to = points.back_in(start, cell);
+            else if (stage == kOutside && start.labels.size() > 1)
+                to = points.on_face(mean_of(crossings), cell);
+            else if (stage > kOutside) {
                 stage_[v] = kLastStage;
-                to = LabelledPoint{mean, points.label(mean)};
+                to = LabelledPoint{mean_of(crossings), points.label(mean_of(crossings))};
             }
         }
         mesh_.positions[v] = to->point;

@@ -240,27 +240,33 @@ std::optional<Vec3> SurfacePoints::on_cell_face(const Crossing& a, const Crossin
 
 std::optional<LabelledPoint> SurfacePoints::aside(const LabelledPoint& p,
                                                   std::span<const Crossing> crossings,
-                                                  double share) const {
-    std::optional<LabelledPoint> best;
-    std::size_t most = 0;
-    for (const Primitive own : p.labels.all()) {
+                                                  std::size_t rank, double share) const {
+    struct Face {
+        Primitive primitive;
         Vec3 sum;
-        std::size_t n = 0;
+        double n = 0;
+    };
+    std::array<Face, PrimitiveSet::kMost> faces;
+    if (rank >= p.labels.size() || p.labels.size() < 2)
+        return std::nullopt;
+    for (std::size_t i = 0; i < p.labels.size(); ++i) {
+        faces[i].primitive = p.labels[i];
         for (const Crossing& c : crossings)
-            if (c.primitive == own) {
-                sum += c.point;
-                ++n;
+            if (c.primitive == p.labels[i]) {
+                faces[i].sum += c.point;
+                ++faces[i].n;
             }
-        if (n <= most)
-            continue;
-        const Vec3 to = p.point + (sum / static_cast<double>(n) - p.point) * share;
-        const auto on = onto(field_, PrimitiveSet(own), to, lattice_.voxel_m);
-        if (!on || !is_on(*on))
-            continue;
-        most = n;
-        best = LabelledPoint{*on, PrimitiveSet(own)};
     }
-    return best;
+    std::stable_sort(faces.begin(), faces.begin() + std::ptrdiff_t(p.labels.size()),
+                     [](const Face& a, const Face& b) { return a.n > b.n; });
+    const Face& own = faces[rank];
+    if (own.n == 0)
+        return std::nullopt;
+    const auto on = onto(field_, PrimitiveSet(own.primitive),
+                         p.point + (own.sum / own.n - p.point) * share, lattice_.voxel_m);
+    if (!on || !is_on(*on))
+        return std::nullopt;
+    return LabelledPoint{*on, PrimitiveSet(own.primitive)};
 }
 
 LabelledPoint SurfacePoints::back_in(const LabelledPoint& p, const Box& cell) const {

@@ -41,10 +41,10 @@ public:
     LabelledPoint place(std::span<const Crossing> crossings, const Box& cell, double slack_m) const;
     /// The same without rims: a point of the face at `p`, held to the cell.
     LabelledPoint on_face(const Vec3& p, const Box& cell) const;
-    /// From a point of a rim or a face a share of the way to the crossings of its face that has the
-    /// most of them.
+    /// From a point of a rim a share of the way to the crossings of one of its faces: that with the
+    /// most of them has rank 0.
     std::optional<LabelledPoint> aside(const LabelledPoint& p, std::span<const Crossing> crossings,
-                                       double share) const;
+                                       std::size_t rank, double share) const;
     /// What is left in a cell of a point outside of it: of a corner one of its rims, of others the
     /// face.
     LabelledPoint back_in(const LabelledPoint& p, const Box& cell) const;

@@ -115,8 +115,7 @@ TEST(ExtractField, IsSharpAndExactAtFullExtraction) {
         SCOPED_TRACE(s.name);
         const LabelledMesh mesh = extract(*rasterize(*s.field, kLattice), s.field.get(), kFull);
         expect_trustworthy(mesh);
-        // Corners beyond a cell, and vertices that stepped back, cut their rims by up to this.
-        expect_near(*s.field, mesh, 0.45, 4);
+        expect_near(*s.field, mesh, 0.1, 4);
     }
 }
 
@@ -128,8 +127,7 @@ TEST(ExtractField, StaysWithinItsBoundWhereCellsGrow) {
         const LabelledMesh mesh = extract(*grid, s.field.get(), {0.25, 4});
         expect_trustworthy(mesh);
         EXPECT_LT(2 * mesh.triangles.size(), full.triangles.size());
-        // Faces keep to the bound; rims are cut where cells of two sizes meet.
-        expect_near(*s.field, mesh, 1.2, 85);
+        expect_near(*s.field, mesh, 0.25, 15);
     }
 }
 
@@ -142,7 +140,7 @@ TEST(ExtractField, LabelsFacesRimsAndCorners) {
         n_corners += mesh.labels[v].size() == 3;
         n_rims += mesh.labels[v].size() == 2;
         for (const Primitive p : mesh.labels[v].all())
-            EXPECT_NEAR(probe->of(p, mesh.positions[v]).value_m, 0, 0.05 * kVoxel); // stepped back
+            EXPECT_NEAR(probe->of(p, mesh.positions[v]).value_m, 0, 1e-3 * kVoxel);
     }
     EXPECT_EQ(n_corners, 8u);
     EXPECT_GT(n_rims, 12 * 1.6 / kVoxel / 1.8); // an edge passes a cell every 1.7 voxels at least
@@ -161,7 +159,7 @@ TEST(ExtractField, IsSharpAlongTheEdgesOfAMesh) {
     EXPECT_GE(n_corners, 8u);
     const auto probe = field.probe({{-2, -2, -2}, {2, 2, 2}}, 0.2);
     for (const Vec3& p : sharp.positions)
-        EXPECT_NEAR(probe->at(p).value_m, 0, 0.5 * kVoxel); // those that had to step back
+        EXPECT_NEAR(probe->at(p).value_m, 0, 0.2 * kVoxel);
 }
 
 TEST(ExtractField, KeepsSmoothSolidsSmooth) {
