@@ -5,6 +5,7 @@
 #include <span>
 #include <string>
 #include <tuple>
+#include <unordered_set>
 
 #include <tbb/blocked_range.h>
 #include <tbb/parallel_for.h>
@@ -24,6 +25,7 @@ namespace taihu {
 namespace {
 
 constexpr double kReach_vox = 1.25; // a level set of half width 3 tells that much between voxels
+constexpr double kSlack_vox = 2;    // so far from their cells the edges of fins may be
 
 /// Calls fn(points, i) for i below n, in parallel, with points for one thread.
 template <class Fn>
@@ -72,7 +74,8 @@ public:
         stage_.assign(surface_.n_vertices(), 0);
         each(surface_.n_vertices(), points_, progress_,
              [&](const SurfacePoints& points, std::size_t v) {
-                 const auto placed = points.place(crossings_of(v), cell_box(v), points.voxel_m());
+                 const auto placed =
+                     points.place(crossings_of(v), cell_box(v), kSlack_vox * points.voxel_m());
                  mesh_.positions[v] = placed.point;
                  mesh_.labels[v] = placed.labels;
              });
@@ -117,7 +120,7 @@ public:
     }
 
 private:
-    static constexpr std::uint8_t kOutside = 5, kLastStage = 7;
+    static constexpr std::uint8_t kOutside = 7, kLastStage = 9;
 
     /// Triangles that may cross others: those with corners that left their cells or on edges within
     /// one primitive, and those round
@@ -175,10 +178,11 @@ private:
     /// stretch of that, and a little is enough to part them. Then into the cell, if it is outside;
     /// off the rim; to the middle of the crossings.
     void step_back(const SurfacePoints& points, std::uint32_t v) {
-        static constexpr std::array<double, 2> kAside = {0.05, 0.25}; // of the way to the crossings
+        static constexpr std::array<double, 3> kAside = {0.05, 0.2,
+                                                         0.6}; // of the way to the crossings
         const Box cell = cell_box(v);
         const auto crossings = crossings_of(v);
-        const LabelledPoint start = points.place(crossings, cell, points.voxel_m());
+        const LabelledPoint start = points.place(crossings, cell, kSlack_vox * points.voxel_m());
         std::optional<LabelledPoint> to;
         while (!to) {
             const std::uint8_t stage = stage_[v]++;
@@ -258,13 +262,51 @@ private:
         for (std::size_t t = 0; t < picked.size(); ++t)
             if (picked[t] && is_needle(mesh_.triangles[t]))
                 add_movable({&mesh_.triangles[t], 1}, hit);
-        for (const auto& pair : crossing_pairs(mesh_.positions, mesh_.triangles, picked))
-            add_movable(std::array{mesh_.triangles[pair.first], mesh_.triangles[pair.second]}, hit);
+        const std::vector<std::uint32_t> near = near_to(picked);
+        std::vector<Triangle> faces;
+        std::vector<std::uint8_t> of_picked;
+        for (const std::uint32_t t : near) {
+            faces.push_back(mesh_.triangles[t]);
+            of_picked.push_back(picked[t]);
+        }
+        for (const auto& pair : crossing_pairs(mesh_.positions, faces, of_picked))
+            add_movable(std::array{faces[pair.first], faces[pair.second]}, hit);
         if (hit.empty())
             hit = in_one_place();
         std::sort(hit.begin(), hit.end());
         hit.erase(std::unique(hit.begin(), hit.end()), hit.end());
         return hit;
+    }
+    /// The triangles that may reach picked ones: they and these are within 6 voxels of their edges.
+    std::vector<std::uint32_t> near_to(const std::vector<std::uint8_t>& picked) const {
+        const auto coarse = [&](std::size_t polygon) {
+            const openvdb::Coord& c = blocks_[surface_.edges()[polygon].block].origin;
+            return openvdb::Coord(c.x() >> 4, c.y() >> 4, c.z() >> 4);
+        };
+        std::unordered_set<openvdb::Coord> close;
+        std::uint32_t last = ~0u; // polygons come block by block
+        for (std::size_t i = 0; i < crossings_.size(); ++i)
+            if (surface_.edges()[i].block != last &&
+                std::any_of(picked.begin() + first_triangle_[i],
+                            picked.begin() + first_triangle_[i + 1],
+                            [](std::uint8_t flag) { return flag != 0; })) {
+                last = surface_.edges()[i].block;
+                for (int k = 0; k < 27; ++k)
+                    close.insert(coarse(i).offsetBy(k / 9 - 1, k / 3 % 3 - 1, k % 3 - 1));
+            }
+        std::vector<std::uint32_t> near;
+        last = ~0u;
+        bool is_close = false;
+        for (std::size_t i = 0; i < crossings_.size(); ++i) {
+            if (surface_.edges()[i].block != last) {
+                last = surface_.edges()[i].block;
+                is_close = close.contains(coarse(i));
+            }
+            if (is_close)
+                for (auto t = first_triangle_[i]; t < first_triangle_[i + 1]; ++t)
+                    near.push_back(t);
+        }
+        return near;
     }
     /// Those outside of their cells, or else all.
     void add_movable(std::span<const Triangle> triangles, std::vector<std::uint32_t>& hit) const {
