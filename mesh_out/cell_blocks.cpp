@@ -18,28 +18,38 @@ constexpr int kBlock = 8;
 
 /// The inside of 9^3 voxels; true when some are and some are not.
 bool load(const openvdb::FloatTree& tree, CellBlock& block) {
-    std::size_t n_inside = 0;
+    std::array<unsigned, 81> rows{};
     for (int part = 0; part < 8; ++part) {
         const Coord shift((part >> 2) * kBlock, (part >> 1 & 1) * kBlock, (part & 1) * kBlock);
         const Coord origin = block.origin + shift;
         const Leaf* leaf = tree.probeConstLeaf(origin);
-        const float* values = leaf ? leaf->buffer().data() : nullptr;
         const bool tile = !leaf && tree.getValue(origin) < 0;
         if (!leaf && !tile)
             continue;
-        const Coord end((part >> 2) ? 1 : kBlock, (part >> 1 & 1) ? 1 : kBlock,
-                        (part & 1) ? 1 : kBlock);
-        for (int x = 0; x < end.x(); ++x)
-            for (int y = 0; y < end.y(); ++y)
-                for (int z = 0; z < end.z(); ++z) {
-                    const bool in = values ? values[(x * 8 + y) * 8 + z] < 0 : tile;
-                    const auto i = static_cast<unsigned>(((x + shift.x()) * 9 + y + shift.y()) * 9 +
-                                                         z + shift.z());
-                    block.inside[i / 64] |= std::uint64_t{in} << (i % 64);
-                    n_inside += in;
+        const int n_x = (part >> 2) ? 1 : kBlock, n_y = (part >> 1 & 1) ? 1 : kBlock,
+                  n_z = (part & 1) ? 1 : kBlock;
+        for (int x = 0; x < n_x; ++x)
+            for (int y = 0; y < n_y; ++y) {
+                unsigned bits = tile ? (1u << n_z) - 1 : 0;
+                if (leaf) {
+                    const float* values = leaf->buffer().data() + (x * 8 + y) * 8;
+                    for (int z = 0; z < n_z; ++z)
+                        bits |= static_cast<unsigned>(values[z] < 0) << z;
                 }
+                rows[static_cast<std::size_t>((x + shift.x()) * 9 + y + shift.y())] |= bits
+                                                                                       << shift.z();
+            }
     }
-    return n_inside != 0 && n_inside != 729;
+    unsigned any = 0, all = 0x1ff;
+    for (std::size_t i = 0; i < rows.size(); ++i) {
+        any |= rows[i];
+        all &= rows[i];
+        const std::size_t at = 9 * i;
+        block.inside[at / 64] |= std::uint64_t{rows[i]} << (at % 64);
+        if (at % 64 > 55)
+            block.inside[at / 64 + 1] |= std::uint64_t{rows[i]} >> (64 - at % 64);
+    }
+    return any != 0 && all != 0x1ff;
 }
 
 /// Patterns of 3 x 3 samples on a face that one arc or none passes.

@@ -72,7 +72,7 @@ public:
     /// The cell that holds a voxel cell at c of a block, whose parts may be -1, in the next one.
     std::optional<CellRef> cell(std::size_t block, const openvdb::Coord& c) const;
 
-    static openvdb::Coord local(std::uint16_t cell) { return {cell >> 6, cell >> 3 & 7, cell & 7}; }
+    static openvdb::Coord local(int cell) { return {cell >> 6, cell >> 3 & 7, cell & 7}; }
     static std::uint16_t number(const openvdb::Coord& c) {
         return static_cast<std::uint16_t>((c.x() * 8 + c.y()) * 8 + c.z());
     }

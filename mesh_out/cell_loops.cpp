@@ -82,10 +82,15 @@ const FaceRing& face_ring(int face) {
 }
 
 unsigned alternating_faces(unsigned inside) {
-    unsigned faces = 0;
-    for (int f = 0; f < 6; ++f)
-        faces |= static_cast<unsigned>(alternates(inside, face_ring(f))) << f;
-    return faces;
+    static const std::array<std::uint8_t, 256> table = [] {
+        std::array<std::uint8_t, 256> all{};
+        for (unsigned i = 0; i < 256; ++i)
+            for (int f = 0; f < 6; ++f)
+                all[i] =
+                    static_cast<std::uint8_t>(all[i] | unsigned{alternates(i, face_ring(f))} << f);
+        return all;
+    }();
+    return table[inside];
 }
 
 const CellLoops& cell_loops(unsigned inside, unsigned joined) {

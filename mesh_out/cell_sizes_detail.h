@@ -1,12 +1,8 @@
 #pragma once
 #include <cstdint>
-#include <optional>
 #include <unordered_set>
-#include <utility>
-#include <vector>
 
 #include "mesh_out/cell_blocks_detail.h"
-#include "mesh_out/surface_points_detail.h"
 
 namespace taihu {
 
@@ -15,22 +11,15 @@ struct CellSizeSettings {
     double bound_vox = .1; ///< chords between the cells' vertices may be so far off the surface
 };
 
-/// Crossings that were found on the way, by block; sorted by key, which is that of
-/// DualSurface::Edge.
-using KnownCrossings = std::vector<std::vector<std::pair<std::uint16_t, Crossing>>>;
-
 /// Cells that are not to be, whatever the surface in them: (block * 512 + first voxel cell) * 8 +
 /// size.
 using SmallCells = std::unordered_set<std::uint64_t>;
 
-/// Joins voxel cells where the surface is one face in them, or one rim between two, that a cell of
-/// that size can hold; then balances.
-KnownCrossings choose_cell_sizes(CellBlocks& blocks, const SurfacePoints& points,
-                                 const CellSizeSettings& settings, const SmallCells& small,
-                                 Progress* progress);
-
-/// The crossing on an edge of a block, looked up or found.
-Crossing crossing_on(const CellBlocks& blocks, const SurfacePoints& points,
-                     const KnownCrossings& known, std::uint32_t block, std::uint16_t key);
+/// Joins voxel cells where the surface is one face in them that bends so little that a cell of that
+/// size can hold it; then balances. The values of the grid tell: between voxels beside the surface
+/// their second differences are its curvature, and jump where it has a rim or another one is near.
+void choose_cell_sizes(CellBlocks& blocks, const openvdb::FloatGrid& solid,
+                       const CellSizeSettings& settings, const SmallCells& small,
+                       Progress* progress);
 
 } // namespace taihu

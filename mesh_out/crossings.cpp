@@ -305,6 +305,57 @@ private:
     unsigned depth_ = 0;
 };
 
+/// Which parts of space some boxes reach into: a quick no for most others.
+class Occupied {
+public:
+    explicit Occupied(std::span<const BoxTree::Face> faces) : bits_(kSide * kSide * kSide / 64) {
+        for (const BoxTree::Face& f : faces) {
+            all_.include(f.box.lo);
+            all_.include(f.box.hi);
+        }
+        const Vec3 size = all_.size();
+        for (int axis = 0; axis < 3; ++axis)
+            // Zero where the whole is flat, or so large that it overflows: then all is in one part.
+            per_m_[axis] = size[axis] > 0 && size[axis] < 1e300 ? (kSide - 0.5) / size[axis] : 0;
+        for (const BoxTree::Face& f : faces)
+            each_part(f.box, [&](std::size_t i) {
+                bits_[i / 64] |= std::uint64_t{1} << (i % 64);
+                return false;
+            });
+    }
+    bool meets(const Box& box) const {
+        return BoxTree::overlap(box, all_) &&
+               each_part(box, [&](std::size_t i) { return (bits_[i / 64] >> (i % 64) & 1) != 0; });
+    }
+
+private:
+    static constexpr std::size_t kSide = 128;
+
+    /// Whether fn(part) is true for one of them.
+    template <class Fn>
+    bool each_part(const Box& box, const Fn& fn) const {
+        std::array<std::size_t, 3> lo, hi;
+        for (int axis = 0; axis < 3; ++axis) {
+            const auto part = [&](double x) {
+                return static_cast<std::size_t>(
+                    std::clamp((x - all_.lo[axis]) * per_m_[axis], 0.0, kSide - 1.0));
+            };
+            lo[static_cast<std::size_t>(axis)] = part(box.lo[axis]);
+            hi[static_cast<std::size_t>(axis)] = part(box.hi[axis]);
+        }
+        for (std::size_t x = lo[0]; x <= hi[0]; ++x)
+            for (std::size_t y = lo[1]; y <= hi[1]; ++y)
+                for (std::size_t z = lo[2]; z <= hi[2]; ++z)
+                    if (fn((x * kSide + y) * kSide + z))
+                        return true;
+        return false;
+    }
+
+    std::vector<std::uint64_t> bits_;
+    Box all_;
+    Vec3 per_m_;
+};
+
 } // namespace
 
 int orient3d(const Vec3& a, const Vec3& b, const Vec3& c, const Vec3& d) {
@@ -401,6 +452,7 @@ crossing_pairs(std::span<const Vec3> positions, std::span<const Triangle> faces,
     if (some.empty())
         return pairs;
     const BoxTree tree(positions, some);
+    const Occupied occupied(tree.faces());
     constexpr std::size_t kChunk = 4096;
     std::vector<Pairs> found(faces.size() / kChunk + 1);
     tbb::parallel_for(std::size_t{0}, found.size(), [&](std::size_t chunk) {
@@ -409,6 +461,8 @@ crossing_pairs(std::span<const Vec3> positions, std::span<const Triangle> faces,
             Box box;
             for (const std::uint32_t v : faces[i])
                 box.include(positions[v]);
+            if (!occupied.meets(box))
+                continue;
             tree.visit_from(0, box, [&](std::size_t k) {
                 const BoxTree::Face& other = tree.faces()[k];
                 const std::uint32_t n = number[other.index];

@@ -159,6 +159,17 @@ void DualSurface::number_vertices() {
 bool DualSurface::polygon_across(std::uint32_t block, const Coord& voxel, int axis,
                                  DualPolygon& polygon) const {
     const int b = (axis + 1) % 3, c = (axis + 2) % 3;
+    // Most edges are within a large cell, or within the face between two.
+    if (const int size = blocks_[block].size_at(voxel); size > 1) {
+        const bool on_b = voxel[b] % size == 0, on_c = voxel[c] % size == 0;
+        if (!on_b && !on_c)
+            return false;
+        if (on_b != on_c) {
+            const CellRef other = *blocks_.cell(block, voxel - along(on_b ? b : c, 1));
+            if (voxel[on_b ? c : b] % other.size != 0)
+                return false;
+        }
+    }
     static constexpr int kAround[4][2] = {{-1, -1}, {0, -1}, {0, 0}, {-1, 0}};
     std::array<CellRef, 4> ring;
     std::size_t n = 0;

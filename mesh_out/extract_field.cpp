@@ -5,6 +5,7 @@
 #include <span>
 #include <string>
 #include <tuple>
+#include <unordered_set>
 
 #include <tbb/blocked_range.h>
 #include <tbb/parallel_for.h>
@@ -24,6 +25,7 @@ namespace taihu {
 namespace {
 
 constexpr double kReach_vox = 1.25; // a level set of half width 3 tells that much between voxels
+constexpr double kSlack_vox = 2;    // so far from their cells the edges of fins may be
 
 /// Calls fn(points, i) for i below n, in parallel, with points for one thread.
 template <class Fn>
@@ -45,11 +47,13 @@ public:
 
     LabelledMesh& mesh() { return mesh_; }
 
-    void find_crossings_of(const KnownCrossings& known) {
+    void find_crossings() {
         const auto& edges = surface_.edges();
         crossings_.resize(edges.size());
         each(edges.size(), points_, progress_, [&](const SurfacePoints& points, std::size_t i) {
-            crossings_[i] = crossing_on(blocks_, points, known, edges[i].block, edges[i].key);
+            crossings_[i] = points.on_edge(blocks_[edges[i].block].origin +
+                                               CellBlocks::local(edges[i].key % 512),
+                                           edges[i].key / 512);
         });
         const auto& polygons = surface_.polygons();
         first_.assign(surface_.n_vertices() + 1, 0);
@@ -70,7 +74,8 @@ public:
         stage_.assign(surface_.n_vertices(), 0);
         each(surface_.n_vertices(), points_, progress_,
              [&](const SurfacePoints& points, std::size_t v) {
-                 const auto placed = points.place(crossings_of(v), cell_box(v), points.voxel_m());
+                 const auto placed =
+                     points.place(crossings_of(v), cell_box(v), kSlack_vox * points.voxel_m());
                  mesh_.positions[v] = placed.point;
                  mesh_.labels[v] = placed.labels;
              });
@@ -81,8 +86,6 @@ public:
         for (std::size_t i = 0; i < surface_.polygons().size(); ++i)
             first_triangle_[i + 1] = first_triangle_[i] + surface_.polygons()[i].n - 2u;
         mesh_.triangles.resize(first_triangle_.back());
-        split_first_.assign(surface_.polygons().size(), 0);
-        turned_.assign(surface_.polygons().size(), 0);
         each(surface_.polygons().size(), points_, progress_,
              [&](const SurfacePoints& points, std::size_t i) { split(points, i); });
     }
@@ -91,22 +94,16 @@ public:
     /// that cannot be helped so are returned.
     std::vector<std::uint32_t> retreat() {
         constexpr int kMostRounds = 16;
-        std::vector<std::uint8_t> picked(mesh_.triangles.size(), 1);
+        std::vector<std::uint8_t> picked = risky();
         std::vector<std::uint32_t> hit;
         for (int round = 0; round < kMostRounds; ++round) {
-            std::vector<std::uint32_t> polygons; // that change
-            hit = in_trouble(picked, polygons);
-            if (hit.empty() && polygons.empty())
+            hit = in_trouble(picked);
+            if (std::all_of(hit.begin(), hit.end(),
+                            [&](std::uint32_t v) { return stage_[v] >= kLastStage; }))
                 break;
-            if (polygons.empty() && std::all_of(hit.begin(), hit.end(), [&](std::uint32_t v) {
-                    return stage_[v] >= kLastStage;
-                }))
-                break;
-            std::fill(picked.begin(), picked.end(), 0);
-            pick(polygons, picked);
-            polygons.clear();
             each(hit.size(), points_, progress_,
                  [&](const SurfacePoints& points, std::size_t i) { step_back(points, hit[i]); });
+            std::vector<std::uint32_t> polygons; // that change
             for (const std::uint32_t v : hit)
                 polygons.insert(polygons.end(), around_.begin() + first_[v],
                                 around_.begin() + first_[v + 1]);
@@ -114,18 +111,50 @@ public:
             polygons.erase(std::unique(polygons.begin(), polygons.end()), polygons.end());
             each(polygons.size(), points_, progress_,
                  [&](const SurfacePoints& points, std::size_t i) { split(points, polygons[i]); });
-            pick(polygons, picked);
+            std::fill(picked.begin(), picked.end(), 0);
+            for (const std::uint32_t p : polygons)
+                for (auto t = first_triangle_[p]; t < first_triangle_[p + 1]; ++t)
+                    picked[t] = 1;
         }
         return hit;
     }
 
 private:
-    static constexpr std::uint8_t kLastStage = 3;
+    static constexpr std::uint8_t kOutside = 7, kLastStage = 9;
 
-    void pick(const std::vector<std::uint32_t>& polygons, std::vector<std::uint8_t>& picked) const {
-        for (const std::uint32_t p : polygons)
-            for (auto t = first_triangle_[p]; t < first_triangle_[p + 1]; ++t)
-                picked[t] = 1;
+    /// Triangles that may cross others: those with corners that left their cells or on edges within
+    /// one primitive, and those round
+    /// a triangle that is not of one primitive with its edge, does not face as that does, or has
+    /// all corners on one rim.
+    std::vector<std::uint8_t> risky() const {
+        constexpr double kUpright = 0.5; // cosine of 60 degrees
+        std::vector<std::uint8_t> astray(mesh_.positions.size()), risk(mesh_.triangles.size());
+        tbb::parallel_for(std::size_t{0}, astray.size(), [&](std::size_t v) {
+            astray[v] = !cell_box(v).contains(mesh_.positions[v]) || !is_smooth(crossings_of(v));
+        });
+        tbb::parallel_for(std::size_t{0}, crossings_.size(), [&](std::size_t i) {
+            const Crossing& c = crossings_[i];
+            for (auto t = first_triangle_[i]; t < first_triangle_[i + 1]; ++t) {
+                const Triangle& corners = mesh_.triangles[t];
+                const auto label = [&](std::size_t k) { return mesh_.labels[corners[k]]; };
+                const Vec3 a = mesh_.positions[corners[0]], b = mesh_.positions[corners[1]],
+                           d = mesh_.positions[corners[2]], n = cross(b - a, d - a);
+                risk[t] = !c.known || is_needle(corners) ||
+                          !(dot(n, c.normal) > kUpright * length(n)) ||
+                          label(0).common(label(1)).common(label(2)).size() > 1;
+                for (const std::uint32_t v : corners)
+                    risk[t] = risk[t] || !mesh_.labels[v].has(c.primitive);
+            }
+        });
+        for (std::size_t t = 0; t < risk.size(); ++t)
+            if (risk[t])
+                for (const std::uint32_t v : mesh_.triangles[t])
+                    astray[v] = 1;
+        tbb::parallel_for(std::size_t{0}, risk.size(), [&](std::size_t t) {
+            for (const std::uint32_t v : mesh_.triangles[t])
+                risk[t] = risk[t] || astray[v];
+        });
+        return risk;
     }
 
     /// Good until the same thread asks again.
@@ -145,84 +174,40 @@ private:
         return box;
     }
 
-    /// Into the cell, if it is outside; off the rim; to the middle of the crossings.
+    /// Aside of a rim, first: where a solid is a fin, cells on both sides of its edge take the same
+    /// stretch of that, and a little is enough to part them. Then into the cell, if it is outside;
+    /// off the rim; to the middle of the crossings.
     void step_back(const SurfacePoints& points, std::uint32_t v) {
+        static constexpr std::array<double, 3> kAside = {0.05, 0.2,
+                                                         0.6}; // of the way to the crossings
         const Box cell = cell_box(v);
-        LabelledPoint p{mesh_.positions[v], mesh_.labels[v]};
-        if (stage_[v] == 0 && !cell.contains(p.point)) {
-            stage_[v] = 1;
-            p = points.back_in(p, cell);
-        } else if (const Vec3 mean = mean_of(crossings_of(v));
-                   stage_[v] < 2 && p.labels.size() > 1) {
-            stage_[v] = 2;
-            p = points.on_face(mean, cell);
-        } else {
-            stage_[v] = kLastStage;
-            p = {mean, points.label(mean)};
+        const auto crossings = crossings_of(v);
+        const LabelledPoint start = points.place(crossings, cell, kSlack_vox * points.voxel_m());
+        std::optional<LabelledPoint> to;
+        while (!to) {
+            const std::uint8_t stage = stage_[v]++;
+            if (stage < kOutside - 1)
+                to = points.aside(start, crossings, stage % 2, kAside[stage / 2]);
+            else if (stage == kOutside - 1 && !cell.contains(start.point))
+                to = points.back_in(start, cell);
+            else if (stage == kOutside && start.labels.size() > 1)
+                to = points.on_face(mean_of(crossings), cell);
+            else if (stage > kOutside) {
+                stage_[v] = kLastStage;
+                to = LabelledPoint{mean_of(crossings), points.label(mean_of(crossings))};
+            }
         }
-        mesh_.positions[v] = p.point;
-        mesh_.labels[v] = p.labels;
+        mesh_.positions[v] = to->point;
+        mesh_.labels[v] = to->labels;
     }
 
     void split(const SurfacePoints& points, std::size_t i) {
-        const DualPolygon& polygon = surface_.polygons()[i];
-        write_split(i,
-                    polygon.n == 3 || along_first(points, polygon.vertices, crossings_[i].normal));
-    }
-    void write_split(std::size_t i, bool along_first) {
-        const auto& v = surface_.polygons()[i].vertices;
+        const auto& [v, n] = surface_.polygons()[i];
+        const bool first = n == 3 || along_first(points, v, crossings_[i].normal);
         Triangle* out = &mesh_.triangles[first_triangle_[i]];
-        split_first_[i] = along_first;
-        out[0] = along_first ? Triangle{v[0], v[1], v[2]} : Triangle{v[1], v[2], v[3]};
-        if (surface_.polygons()[i].n == 4)
-            out[1] = along_first ? Triangle{v[0], v[2], v[3]} : Triangle{v[1], v[3], v[0]};
-    }
-
-    /// Splits the quads of two triangles that cross along other diagonals, if that helps; once
-    /// each.
-    bool untangle(const std::array<std::uint32_t, 2>& pair, std::vector<std::uint32_t>& changed) {
-        std::array<std::size_t, 2> of;
-        for (std::size_t k = 0; k < 2; ++k)
-            of[k] = static_cast<std::size_t>(
-                std::upper_bound(first_triangle_.begin(), first_triangle_.end(), pair[k]) -
-                first_triangle_.begin() - 1);
-        const std::array<bool, 2> was = {split_first_[of[0]] != 0, split_first_[of[1]] != 0};
-        const auto may_turn = [&](std::size_t k) {
-            return surface_.polygons()[of[k]].n == 4 && !turned_[of[k]];
-        };
-        for (const unsigned which : {1u, 2u, 3u}) {
-            if ((which & 1 && !may_turn(0)) || (which & 2 && !may_turn(1)) ||
-                (of[0] == of[1] && which != 1))
-                continue;
-            for (std::size_t k = 0; k < 2; ++k)
-                write_split(of[k], was[k] != ((which >> (of[0] == of[1] ? 0 : k) & 1) != 0));
-            if (!cross_each_other(of[0], of[1])) {
-                for (std::size_t k = 0; k < 2; ++k)
-                    turned_[of[k]] = turned_[of[k]] || (which >> k & 1) != 0;
-                changed.insert(changed.end(), of.begin(), of.end());
-                return true;
-            }
-        }
-        for (std::size_t k = 0; k < 2; ++k)
-            write_split(of[k], was[k]);
-        return false;
-    }
-    bool cross_each_other(std::size_t one, std::size_t other) const {
-        std::vector<std::uint32_t> all;
-        for (const std::size_t p : {one, other})
-            for (auto t = first_triangle_[p]; t < first_triangle_[p + 1]; ++t)
-                all.push_back(t);
-        std::sort(all.begin(), all.end());
-        all.erase(std::unique(all.begin(), all.end()), all.end());
-        for (std::size_t i = 0; i < all.size(); ++i) {
-            if (is_needle(mesh_.triangles[all[i]]))
-                return true;
-            for (std::size_t k = i + 1; k < all.size(); ++k)
-                if (!is_needle(mesh_.triangles[all[k]]) &&
-                    faces_cross(mesh_.positions, mesh_.triangles[all[i]], mesh_.triangles[all[k]]))
-                    return true;
-        }
-        return false;
+        out[0] = first ? Triangle{v[0], v[1], v[2]} : Triangle{v[1], v[2], v[3]};
+        if (n == 4)
+            out[1] = first ? Triangle{v[0], v[2], v[3]} : Triangle{v[1], v[3], v[0]};
     }
 
     /// Whether to split a quad from its first corner to the third: along a rim, or so that its
@@ -272,25 +257,56 @@ private:
     }
 
     /// The vertices to move of triangles that cross, have no area, or two vertices in one place.
-    /// \param turned  polygons that were split along their other diagonal instead.
-    std::vector<std::uint32_t> in_trouble(const std::vector<std::uint8_t>& picked,
-                                          std::vector<std::uint32_t>& turned) {
+    std::vector<std::uint32_t> in_trouble(const std::vector<std::uint8_t>& picked) const {
         std::vector<std::uint32_t> hit;
-        std::vector<char> needle(mesh_.triangles.size());
-        tbb::parallel_for(std::size_t{0}, needle.size(),
-                          [&](std::size_t t) { needle[t] = is_needle(mesh_.triangles[t]); });
-        for (std::size_t t = 0; t < needle.size(); ++t)
-            if (needle[t])
+        for (std::size_t t = 0; t < picked.size(); ++t)
+            if (picked[t] && is_needle(mesh_.triangles[t]))
                 add_movable({&mesh_.triangles[t], 1}, hit);
-        for (const auto& pair : crossing_pairs(mesh_.positions, mesh_.triangles, picked))
-            if (!untangle({pair.first, pair.second}, turned))
-                add_movable(std::array{mesh_.triangles[pair.first], mesh_.triangles[pair.second]},
-                            hit);
-        if (hit.empty() && turned.empty())
+        const std::vector<std::uint32_t> near = near_to(picked);
+        std::vector<Triangle> faces;
+        std::vector<std::uint8_t> of_picked;
+        for (const std::uint32_t t : near) {
+            faces.push_back(mesh_.triangles[t]);
+            of_picked.push_back(picked[t]);
+        }
+        for (const auto& pair : crossing_pairs(mesh_.positions, faces, of_picked))
+            add_movable(std::array{faces[pair.first], faces[pair.second]}, hit);
+        if (hit.empty())
             hit = in_one_place();
         std::sort(hit.begin(), hit.end());
         hit.erase(std::unique(hit.begin(), hit.end()), hit.end());
         return hit;
+    }
+    /// The triangles that may reach picked ones: they and these are within 6 voxels of their edges.
+    std::vector<std::uint32_t> near_to(const std::vector<std::uint8_t>& picked) const {
+        const auto coarse = [&](std::size_t polygon) {
+            const openvdb::Coord& c = blocks_[surface_.edges()[polygon].block].origin;
+            return openvdb::Coord(c.x() >> 4, c.y() >> 4, c.z() >> 4);
+        };
+        std::unordered_set<openvdb::Coord> close;
+        std::uint32_t last = ~0u; // polygons come block by block
+        for (std::size_t i = 0; i < crossings_.size(); ++i)
+            if (surface_.edges()[i].block != last &&
+                std::any_of(picked.begin() + first_triangle_[i],
+                            picked.begin() + first_triangle_[i + 1],
+                            [](std::uint8_t flag) { return flag != 0; })) {
+                last = surface_.edges()[i].block;
+                for (int k = 0; k < 27; ++k)
+                    close.insert(coarse(i).offsetBy(k / 9 - 1, k / 3 % 3 - 1, k % 3 - 1));
+            }
+        std::vector<std::uint32_t> near;
+        last = ~0u;
+        bool is_close = false;
+        for (std::size_t i = 0; i < crossings_.size(); ++i) {
+            if (surface_.edges()[i].block != last) {
+                last = surface_.edges()[i].block;
+                is_close = close.contains(coarse(i));
+            }
+            if (is_close)
+                for (auto t = first_triangle_[i]; t < first_triangle_[i + 1]; ++t)
+                    near.push_back(t);
+        }
+        return near;
     }
     /// Those outside of their cells, or else all.
     void add_movable(std::span<const Triangle> triangles, std::vector<std::uint32_t>& hit) const {
@@ -298,7 +314,7 @@ private:
             const std::size_t before = hit.size();
             for (const Triangle& t : triangles)
                 for (const std::uint32_t v : t)
-                    if (all || (stage_[v] == 0 && !cell_box(v).contains(mesh_.positions[v])))
+                    if (all || (stage_[v] < kOutside && !cell_box(v).contains(mesh_.positions[v])))
                         hit.push_back(v);
             return hit.size() > before;
         };
@@ -335,8 +351,6 @@ private:
     std::vector<Crossing> crossings_;           ///< one for each polygon
     std::vector<std::uint32_t> first_, around_; ///< polygons of vertex v
     std::vector<std::uint32_t> first_triangle_; ///< of each polygon
-    std::vector<char> split_first_;             ///< which diagonal polygons are split along
-    std::vector<char> turned_;                  ///< those for which another one was taken
     std::vector<std::uint8_t> stage_;           ///< of retreat
     LabelledMesh mesh_;
 };
@@ -393,13 +407,13 @@ LabelledMesh extract(const openvdb::FloatGrid& solid, const Field* field,
     const SurfacePoints points(solid, *probe, lattice);
     SmallCells small;
     for (int attempt = 0; attempt < kMostAttempts; ++attempt) {
-        const KnownCrossings known = choose_cell_sizes(
-            blocks, points, {settings.most_spacing, settings.bound_vox}, small, progress);
+        choose_cell_sizes(blocks, solid, {settings.most_spacing, settings.bound_vox}, small,
+                          progress);
         const DualSurface surface(blocks, points);
         if (!in_band(blocks, surface, solid))
             refuse_clipped(solid);
         Mesher mesher(blocks, surface, points, progress);
-        mesher.find_crossings_of(known);
+        mesher.find_crossings();
         mesher.place();
         mesher.split_all();
         const std::vector<std::uint32_t> stuck = mesher.retreat();

@@ -9,6 +9,7 @@ namespace {
 
 // In voxels.
 constexpr double kOnEdge = 1e-4, kOnSurface = 1e-3, kNearEnough = 0.05, kFarthest = 4;
+constexpr double kBesideEdge = 0.01, kMostStep = 0.05; // what a tangent is good for
 // Normals of one primitive that differ by more than 40 degrees in a cell: it has edges of its own.
 constexpr double kSmoothCosine = 0.77;
 
@@ -49,6 +50,8 @@ std::optional<Vec3> nearest_to_planes(std::span<const Crossing> crossings, const
     return mean + *step;
 }
 
+} // namespace
+
 bool is_smooth(std::span<const Crossing> crossings) {
     for (std::size_t i = 0; i < crossings.size(); ++i)
         for (std::size_t k = i + 1; k < crossings.size(); ++k)
@@ -57,8 +60,6 @@ bool is_smooth(std::span<const Crossing> crossings) {
                 return false;
     return true;
 }
-
-} // namespace
 
 Vec3 held(const Vec3& p, const Box& box) {
     return max(box.lo, min(box.hi, p));
@@ -90,9 +91,17 @@ Crossing SurfacePoints::on_edge(const openvdb::Coord& at, int axis) const {
             i % 3 == 2 ? 0.5 * (t0 + t1) : t0 + (t1 - t0) * std::clamp(f0 / (f0 - f1), 0.02, 0.98);
         const Vec3 p = p0 + way * t;
         const FieldProbe::Nearest f = field_.at(p);
-        if (std::fabs(f.value_m) <= kOnEdge * lattice_.voxel_m) {
+        if (std::fabs(f.value_m) <= kBesideEdge * lattice_.voxel_m) {
+            // So near, its primitive alone says the rest.
             const FieldProbe::Value v = field_.of(f.primitive, p);
-            return {p, normalized(v.gradient), f.primitive, true};
+            const double slope = length(v.gradient), by = -v.value_m / v.gradient[axis];
+            if (std::fabs(by) <= kMostStep * lattice_.voxel_m && t * lattice_.voxel_m + by >= 0 &&
+                t * lattice_.voxel_m + by <= lattice_.voxel_m) {
+                c.point[axis] = p[axis] + by;
+                return {c.point, v.gradient / slope, f.primitive, true};
+            }
+            if (std::fabs(f.value_m) <= kOnEdge * lattice_.voxel_m)
+                return {p, normalized(v.gradient), f.primitive, true};
         }
         if ((f.value_m < 0) == starts_inside) {
             t0 = t;
@@ -139,13 +148,29 @@ LabelledPoint SurfacePoints::place(std::span<const Crossing> crossings, const Bo
             if (std::fabs(field_.at(in).value_m) <= 0.1 * lattice_.voxel_m)
                 return {in, set};
         }
+    } else if (set.size() == 1) {
+        if (const auto p = beside(set[0], mean); p && cell.dilated(slack_m).contains(*p))
+            return {*p, set};
     }
+    if (set.size() == 2 && all_in)
+        if (const auto p = between_faces(set, crossings, cell))
+            return {*p, set};
     if (all_in)
         if (const auto found = settle(set, mean, cell, slack_m))
             return *found;
     if (const auto found = on_rim(set, mean, cell))
         return *found;
     return on_face(mean, cell);
+}
+
+std::optional<Vec3> SurfacePoints::beside(Primitive primitive, const Vec3& p) const {
+    const FieldProbe::Value from = field_.of(primitive, p);
+    const Vec3 way = from.gradient / length_squared(from.gradient);
+    const Vec3 near = p - way * from.value_m;
+    const double left_m = field_.at(near).value_m;
+    if (!(std::fabs(left_m) <= kOnSurface * lattice_.voxel_m))
+        return std::nullopt;
+    return near - way * left_m;
 }
 
 std::optional<LabelledPoint> SurfacePoints::on_rim(const PrimitiveSet& set, const Vec3& from,
@@ -161,6 +186,87 @@ std::optional<LabelledPoint> SurfacePoints::on_rim(const PrimitiveSet& set, cons
             best = LabelledPoint{*p, two};
     }
     return best;
+}
+
+std::optional<Vec3> SurfacePoints::between_faces(const PrimitiveSet& set,
+                                                 std::span<const Crossing> crossings,
+                                                 const Box& cell) const {
+    std::array<Vec3, 2> ends;
+    std::size_t n = 0;
+    for (std::size_t i = 0; i < crossings.size(); ++i)
+        for (std::size_t k = i + 1; k < crossings.size(); ++k) {
+            const Crossing &a = crossings[i], &b = crossings[k];
+            if (a.primitive == b.primitive)
+                continue;
+            for (int axis = 0; axis < 3; ++axis) {
+                const double at = a.point[axis];
+                if (at != b.point[axis] || (at != cell.lo[axis] && at != cell.hi[axis]))
+                    continue;
+                const auto p = on_cell_face(a, b, axis, cell);
+                if (!p)
+                    continue;
+                if (n < 2)
+                    ends[n++] = *p;
+                else if (length(*p - ends[0]) > length(ends[1] - ends[0]))
+                    ends[1] = *p;
+            }
+        }
+    if (n < 2)
+        return std::nullopt;
+    const auto p = onto(field_, set, (ends[0] + ends[1]) * 0.5, kFarthest * lattice_.voxel_m);
+    return p && cell.contains(*p) && is_on(*p) ? p : std::nullopt;
+}
+
+std::optional<Vec3> SurfacePoints::on_cell_face(const Crossing& a, const Crossing& b, int axis,
+                                                const Box& cell) const {
+    constexpr double kLeastArea = 0.02; // sine of the angle between the two curves
+    const int u = (axis + 1) % 3, v = (axis + 2) % 3;
+    Vec3 p = (a.point + b.point) * 0.5;
+    p[axis] = a.point[axis];
+    for (int i = 0; i < 8; ++i) {
+        const FieldProbe::Value f = field_.of(a.primitive, p), g = field_.of(b.primitive, p);
+        if (std::max(std::fabs(f.value_m), std::fabs(g.value_m)) <= kOnEdge * lattice_.voxel_m)
+            return cell.contains(p) ? std::optional(p) : std::nullopt;
+        const double area = f.gradient[u] * g.gradient[v] - f.gradient[v] * g.gradient[u];
+        if (!(std::fabs(area) > kLeastArea * length(f.gradient) * length(g.gradient)))
+            return std::nullopt;
+        p[u] -= (f.value_m * g.gradient[v] - g.value_m * f.gradient[v]) / area;
+        p[v] -= (g.value_m * f.gradient[u] - f.value_m * g.gradient[u]) / area;
+        if (!cell.dilated(2 * lattice_.voxel_m).contains(p))
+            return std::nullopt;
+    }
+    return std::nullopt;
+}
+
+std::optional<LabelledPoint> SurfacePoints::aside(const LabelledPoint& p,
+                                                  std::span<const Crossing> crossings,
+                                                  std::size_t rank, double share) const {
+    struct Face {
+        Primitive primitive;
+        Vec3 sum;
+        double n = 0;
+    };
+    std::array<Face, PrimitiveSet::kMost> faces;
+    if (rank >= p.labels.size() || p.labels.size() < 2)
+        return std::nullopt;
+    for (std::size_t i = 0; i < p.labels.size(); ++i) {
+        faces[i].primitive = p.labels[i];
+        for (const Crossing& c : crossings)
+            if (c.primitive == p.labels[i]) {
+                faces[i].sum += c.point;
+                ++faces[i].n;
+            }
+    }
+    std::stable_sort(faces.begin(), faces.begin() + std::ptrdiff_t(p.labels.size()),
+                     [](const Face& a, const Face& b) { return a.n > b.n; });
+    const Face& own = faces[rank];
+    if (own.n == 0)
+        return std::nullopt;
+    const auto on = onto(field_, PrimitiveSet(own.primitive),
+                         p.point + (own.sum / own.n - p.point) * share, lattice_.voxel_m);
+    if (!on || !is_on(*on))
+        return std::nullopt;
+    return LabelledPoint{*on, PrimitiveSet(own.primitive)};
 }
 
 LabelledPoint SurfacePoints::back_in(const LabelledPoint& p, const Box& cell) const {
@@ -186,6 +292,22 @@ std::optional<LabelledPoint> SurfacePoints::settle(PrimitiveSet set, const Vec3&
     return std::nullopt;
 }
 
+Vec3 SurfacePoints::along_rim(const PrimitiveSet& set, const Vec3& p, const Box& cell) const {
+    const double farthest = kFarthest * lattice_.voxel_m;
+    const Vec3 way =
+        normalized(cross(field_.of(set[0], p).gradient, field_.of(set[1], p).gradient));
+    double first = -farthest, last = farthest;
+    for (int axis = 0; axis < 3; ++axis) {
+        if (std::fabs(way[axis]) < 1e-9)
+            continue;
+        const double a = (cell.lo[axis] - p[axis]) / way[axis],
+                     b = (cell.hi[axis] - p[axis]) / way[axis];
+        first = std::max(first, std::min(a, b));
+        last = std::min(last, std::max(a, b));
+    }
+    return p + way * (0.5 * (first + last));
+}
+
 std::optional<Vec3> SurfacePoints::meeting(const PrimitiveSet& set, const Vec3& from,
                                            const Box& cell, double slack_m) const {
     const double farthest = kFarthest * lattice_.voxel_m;
@@ -193,18 +315,7 @@ std::optional<Vec3> SurfacePoints::meeting(const PrimitiveSet& set, const Vec3& 
     auto p = nearest;
     // A rim that passes crossings of both its faces passes the cell: follow it there.
     for (int i = 0; i < 3 && p && set.size() == 2 && !cell.contains(*p); ++i) {
-        const Vec3 way =
-            normalized(cross(field_.of(set[0], *p).gradient, field_.of(set[1], *p).gradient));
-        double first = -farthest, last = farthest;
-        for (int axis = 0; axis < 3; ++axis) {
-            if (std::fabs(way[axis]) < 1e-9)
-                continue;
-            const double a = (cell.lo[axis] - (*p)[axis]) / way[axis],
-                         b = (cell.hi[axis] - (*p)[axis]) / way[axis];
-            first = std::max(first, std::min(a, b));
-            last = std::min(last, std::max(a, b));
-        }
-        const auto next = onto(field_, set, *p + way * (0.5 * (first + last)), farthest);
+        const auto next = onto(field_, set, along_rim(set, *p, cell), farthest);
         if (!next)
             break;
         p = next;

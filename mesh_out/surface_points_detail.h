@@ -41,6 +41,10 @@ public:
     LabelledPoint place(std::span<const Crossing> crossings, const Box& cell, double slack_m) const;
     /// The same without rims: a point of the face at `p`, held to the cell.
     LabelledPoint on_face(const Vec3& p, const Box& cell) const;
+    /// From a point of a rim a share of the way to the crossings of one of its faces: that with the
+    /// most of them has rank 0.
+    std::optional<LabelledPoint> aside(const LabelledPoint& p, std::span<const Crossing> crossings,
+                                       std::size_t rank, double share) const;
     /// What is left in a cell of a point outside of it: of a corner one of its rims, of others the
     /// face.
     LabelledPoint back_in(const LabelledPoint& p, const Box& cell) const;
@@ -52,11 +56,22 @@ public:
     bool joins(const std::array<openvdb::Coord, 4>& corners) const;
 
 private:
+    /// The nearest point of one primitive, from near it: two steps; none where it is not that of
+    /// the field.
+    std::optional<Vec3> beside(Primitive primitive, const Vec3& p) const;
     std::optional<LabelledPoint> settle(PrimitiveSet set, const Vec3& from, const Box& cell,
                                         double slack_m) const;
+    /// The middle of a rim that passes two faces of the cell between crossings.
+    std::optional<Vec3> between_faces(const PrimitiveSet& set, std::span<const Crossing> crossings,
+                                      const Box& cell) const;
+    /// Where the primitives of two crossings in a face of the cell meet in that face.
+    std::optional<Vec3> on_cell_face(const Crossing& a, const Crossing& b, int axis,
+                                     const Box& cell) const;
     /// The nearest rim in the cell, of three primitives.
     std::optional<LabelledPoint> on_rim(const PrimitiveSet& set, const Vec3& from,
                                         const Box& cell) const;
+    /// From a point of a rim along its tangent to the middle of what of that is in the cell.
+    Vec3 along_rim(const PrimitiveSet& set, const Vec3& p, const Box& cell) const;
     /// Where primitives meet, in the cell if they do so there.
     std::optional<Vec3> meeting(const PrimitiveSet& set, const Vec3& from, const Box& cell,
                                 double slack_m) const;
@@ -70,5 +85,7 @@ private:
 /// `p` held to a box.
 Vec3 held(const Vec3& p, const Box& box);
 Vec3 mean_of(std::span<const Crossing> crossings);
+/// Whether no primitive among them turns so much that it has an edge of its own.
+bool is_smooth(std::span<const Crossing> crossings);
 
 } // namespace taihu
