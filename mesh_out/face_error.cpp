@@ -59,8 +59,12 @@ double FaceErrors::bound(const Corners& face, const Labels& labels, const Rules&
     Range range;
     const std::uint32_t shape =
         own(face, labels, rules.exact_corners, range, (rules.centred ? 2 : 1) * rules.face_m);
-    if (shape == kNone)
-        return kInfinity;
+    return shape == kNone ? kInfinity : bound_beside(shape, range, face, labels, rules);
+}
+
+/// As bound(), of a face on a known primitive.
+double FaceErrors::bound_beside(std::uint32_t shape, const Range& range, const Corners& face,
+                                const Labels& labels, const Rules& rules) const {
     double most = rules.centred ? (range.hi - range.lo) / 2 : range.most();
     if (most > rules.face_m)
         return kInfinity;
@@ -228,7 +232,7 @@ double FaceErrors::against(std::uint32_t own, const Range& own_range, std::uint3
     CornerValues corners{};
     bool is_labelled = false;
     for (std::size_t k = 0; k < 3; ++k) {
-        const bool has = sets_[labels[k]].has(other);
+        const bool has = labels[k] != kNone && sets_[labels[k]].has(other);
         is_labelled = is_labelled || has;
         if (!rules.exact_corners || !has)
             corners[k] = of(other, face[k]).value_m;
@@ -248,12 +252,24 @@ double FaceErrors::against(std::uint32_t own, const Range& own_range, std::uint3
     if (pierces_nothing && (pair.turn > 0 ? range_there.hi : -range_there.lo) > tolerance)
         return kInfinity;
     double most = meeting(pair, face, own_range, range_there, 0);
-    // Corners on both sides of it do not say on which the solid is.
-    if (rules.may_pierce && lo < 0 && hi > 0) {
+    // The corners alone do not say on which side of it the solid is.
+    if (rules.may_pierce && !is_sure_of_side(own, corners, face)) {
         pair.turn = -pair.turn;
         most = std::max(most, meeting(pair, face, own_range, range_there, 0));
     }
     return most;
+}
+
+/// Whether the field goes by `own` at the corner farthest from another primitive, which so has the
+/// solid on that side.
+bool FaceErrors::is_sure_of_side(std::uint32_t own, const CornerValues& other,
+                                 const Corners& face) const {
+    const auto far = static_cast<std::size_t>(
+        std::max_element(other.begin(), other.end(),
+                         [](double a, double b) { return std::abs(a) < std::abs(b); }) -
+        other.begin());
+    const FieldProbe::Nearest n = field_.at(face[far]);
+    return n.primitive == shapes_[own].primitive && std::abs(other[far]) > std::abs(n.value_m);
 }
 
 /// Of the part of a face that lies past the rim of two primitives, an upper bound of the distance
@@ -319,10 +335,27 @@ double FaceErrors::past_rim(const Meeting& pair, const Corners& face, double own
 }
 
 double FaceErrors::searched(const Corners& face, double enough_m, double give_up_m) const {
-    const auto y = surface_point_near(field_, middle(face), 4 * pad_);
-    const double far = y ? radius_about(*y, face) : kInfinity;
-    if (far <= enough_m || longest_edge(face) < kSmallest * enough_m)
-        return far;
+    const Vec3 m = middle(face);
+    const double radius = radius_about(m, face);
+    const FieldProbe::Nearest n = field_.at(m);
+    const double least = std::abs(n.value_m); // distances are never below it
+    if (least > give_up_m)
+        return least;
+    const Rules rules{.face_m = enough_m, .rim_m = enough_m, .may_pierce = true};
+    if (const std::uint32_t shape = shape_of(n.primitive); shape != kNone && least <= enough_m) {
+        const Range r = range(shape, face, nullptr, enough_m);
+        // No corner is told to lie on anything.
+        if (const double known = bound_beside(shape, r, face, {kNone, kNone, kNone}, rules);
+            known <= enough_m)
+            return known;
+    }
+    double far = kInfinity;
+    if (std::hypot(least, radius) <= enough_m || longest_edge(face) < kSmallest * enough_m) {
+        if (const auto y = surface_point_near(field_, m, 4 * pad_))
+            far = radius_about(*y, face);
+        if (far <= enough_m || longest_edge(face) < kSmallest * enough_m)
+            return far;
+    }
     double most = 0;
     for (const Corners& part : quarters(face)) {
         most = std::max(most, searched(part, enough_m, give_up_m));

@@ -67,8 +67,8 @@ public:
     std::span<const std::uint32_t> shapes(std::uint32_t label) const { return sets_[label].all(); }
 
     /// An upper bound of the distances of all points of a face by surface points found near it;
-    /// slow, and right whatever the labels. Parts are not divided where it is at most `enough_m`;
-    /// beyond `give_up_m` the search ends.
+    /// or the closed forms of its parts; slow, and right whatever the labels. Parts are not divided
+    /// where it is at most `enough_m`; where it is found to be beyond `give_up_m` the search ends.
     double searched(const Corners& face, double enough_m, double give_up_m = kFar) const;
 
     static constexpr std::uint32_t kNone = 0xffffffffu;
@@ -103,6 +103,10 @@ private:
     double past_rim(const Meeting& meeting, const Corners& face, double own, double other) const;
     double meeting(const Meeting& meeting, const Corners& face, const Range& own,
                    const Range& other, int depth) const;
+    double bound_beside(std::uint32_t shape, const Range& range, const Corners& face,
+                        const Labels& labels, const Rules& rules) const;
+    std::uint32_t shape_of(Primitive primitive) const;
+    bool is_sure_of_side(std::uint32_t own, const CornerValues& other, const Corners& face) const;
     double against(std::uint32_t own, const Range& own_range, std::uint32_t other,
                    const Corners& face, const Labels& labels, const Rules& rules) const;
     std::span<const std::uint32_t> near(const std::array<int, 3>& cell) const {

@@ -134,6 +134,15 @@ void FaceErrors::find_shapes(const LabelledMesh& mesh) {
     });
 }
 
+/// The number of a primitive's shape; kNone when it comes near nothing.
+std::uint32_t FaceErrors::shape_of(Primitive primitive) const {
+    const auto at = std::lower_bound(shapes_.begin(), shapes_.end(), primitive,
+                                     [](const Shape& s, Primitive p) { return s.primitive < p; });
+    return at == shapes_.end() || at->primitive != primitive
+               ? kNone
+               : static_cast<std::uint32_t>(at - shapes_.begin());
+}
+
 std::uint32_t FaceErrors::label_of(const PrimitiveSet& shapes) {
     const auto at = std::find(sets_.begin(), sets_.end(), shapes);
     const auto number = static_cast<std::uint32_t>(at - sets_.begin());
