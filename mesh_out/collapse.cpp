@@ -17,7 +17,9 @@ constexpr std::uint32_t kNone = CornerTable::kNone;
 constexpr std::size_t kMostValence = 24;
 constexpr float kLengthWeight = 1e-3f; ///< on what is flat, short edges go first
 constexpr float kAtOnce = 1e-20f, kNever = 1e30f;
-constexpr double kHope = 1.25; ///< how far over its estimate an error may still turn out to fit
+constexpr double kHope = 1.25;   ///< how far over its estimate an error may still turn out to fit
+constexpr double kNoDoubt = 0.8; ///< how far below the bound an estimate is taken for the error
+constexpr double kSmooth = 2.85; ///< length of the sum of three gradients of 1 that differ little
 constexpr double kMostBlocks = 1 << 22;
 
 } // namespace
@@ -64,7 +66,7 @@ Collapser::Collapser(CornerTable& table, std::span<const Vec3> positions,
     : table_(table), positions_(positions), frozen_(frozen), errors_(errors), rules_(rules),
       quadrics_(positions.size()), stamps_(positions.size(), 0), owners_(positions.size(), 0),
       inner_(positions.size(), 0), open_(positions.size(), 1), off_(positions.size(), 0),
-      clear_m_(positions.size(), 0), slopes_(positions.size()) {
+      rooms_(positions.size()), slopes_(positions.size()) {
     tbb::parallel_for(
         tbb::blocked_range<std::uint32_t>(0, static_cast<std::uint32_t>(positions.size()), 1024),
         [&](const auto& range) {
@@ -97,7 +99,6 @@ Collapser::Collapser(CornerTable& table, std::span<const Vec3> positions,
                                        static_cast<float>(at.gradient.y),
                                        static_cast<float>(at.gradient.z)}};
                 }
-                clear_m_[v] = static_cast<float>(errors_.clearance(p, errors_.labels()[v]));
             }
         });
 }
@@ -256,11 +257,7 @@ bool Collapser::may_fit(std::uint32_t a, std::uint32_t b) const {
     const Slope &s = slopes_[a], &t = slopes_[b];
     if (s.shape == FaceErrors::kNone || s.shape != t.shape)
         return true;
-    const Vec3 d = positions_[b] - positions_[a];
-    const double at_middle =
-        ((s.gradient[0] - t.gradient[0]) * d.x + (s.gradient[1] - t.gradient[1]) * d.y +
-         (s.gradient[2] - t.gradient[2]) * d.z) /
-        8;
+    const double at_middle = bend(s, t, positions_[b] - positions_[a]).middle;
     return std::abs(at_middle) <= kHope * (rules_.face.centred ? 2 : 1) * rules_.face.face_m;
 }
 
@@ -288,19 +285,64 @@ bool Collapser::shapely(std::uint32_t a, std::uint32_t b, const Ring& ring) cons
     return true;
 }
 
-bool Collapser::legal(std::uint32_t b, const Ring& ring) const {
+const Collapser::Room& Collapser::room(std::uint32_t v) {
+    Room& room = rooms_[v];
+    if (room.any_m < 0) {
+        const auto clear = errors_.clearance(positions_[v], errors_.labels()[v]);
+        const auto down = [](double x) { return static_cast<float>(std::max(0., 0.999 * x)); };
+        room = {down(clear.sampled), down(clear.any)};
+    }
+    return room;
+}
+
+/// Whether a face on one primitive surely fits a ball; on others, whether the parabolas through the
+/// values and gradients at its corners leave no doubt.
+bool Collapser::fits_alone(std::uint32_t b, std::uint32_t v, std::uint32_t w) const {
+    const Vec3 &p = positions_[b], &q = positions_[v], &r = positions_[w];
+    const Vec3 n = cross(q - p, r - p);
+    const std::uint32_t shape = errors_.shapes(errors_.labels()[b])[0];
+    if (errors_.has_closed_form(shape))
+        return errors_.fits_ball(shape, p, n, rules_.face);
+    const Slope &s = slopes_[b], &t = slopes_[v], &u = slopes_[w];
+    const std::array<Bend, 3> bends = {bend(s, t, q - p), bend(t, u, r - q), bend(u, s, p - r)};
+    double lo = 0, hi = 0, sum = 0, skew = 0;
+    for (const Bend& at : bends) {
+        lo = std::min(lo, at.middle);
+        hi = std::max(hi, at.middle);
+        sum += at.middle;
+        skew = std::max(skew, std::abs(at.skew));
+    }
+    lo = std::min(lo, 4. / 9 * sum) - skew;
+    hi = std::max(hi, 4. / 9 * sum) + skew;
+    const double most = rules_.face.centred ? (hi - lo) / 2 : std::max(-lo, hi);
+    if (!(most <= kNoDoubt * rules_.face.face_m))
+        return false;
+    const Vec3 g = s.at() + t.at() + u.at();
+    const double slope = length(g);
+    return slope > kSmooth && dot(n, g) >= rules_.face.turn_cosine * length(n) * slope;
+}
+
+bool Collapser::legal(std::uint32_t b, const Ring& ring) {
     const auto& labels = errors_.labels();
     FaceErrors::Rules rules = rules_.face;
-    rules.clear_m = 0.999 * static_cast<double>(clear_m_[b]); // rounded to single precision
+    const Room& room_b = room(b);
+    rules.clear_m = static_cast<double>(room_b.sampled_m);
+    const bool is_single = errors_.n_primitives(labels[b]) == 1;
+    const double free_m = static_cast<double>(room_b.any_m) - errors_.reach_m(rules);
     for (const std::uint32_t c : ring.all()) {
         const std::uint32_t v = table_.vertex(CornerTable::next(c)),
                             w = table_.vertex(CornerTable::previous(c));
         if (v == b || w == b)
             continue;
+        const Vec3 &p = positions_[b], &q = positions_[v], &r = positions_[w];
         rules.exact_corners = !off_[v] && !off_[w];
-        if (errors_.bound({positions_[b], positions_[v], positions_[w]},
-                          {labels[b], labels[v], labels[w]},
-                          rules) == std::numeric_limits<double>::infinity())
+        if (is_single && rules.exact_corners && labels[v] == labels[b] && labels[w] == labels[b] &&
+            free_m > 0 &&
+            std::max(length_squared(q - p), length_squared(r - p)) < free_m * free_m &&
+            fits_alone(b, v, w))
+            continue;
+        if (errors_.bound({p, q, r}, {labels[b], labels[v], labels[w]}, rules) ==
+            std::numeric_limits<double>::infinity())
             return false;
     }
     return true;

@@ -56,6 +56,9 @@ private:
         std::vector<std::vector<Entry>> entries_{kBuckets};
         std::size_t lowest_ = kBuckets, n_ = 0;
     };
+    struct Room { ///< FaceErrors::clearance(), rounded down; not yet known below 0
+        float sampled_m = -1, any_m = -1;
+    };
     struct Blocks {
         std::vector<std::uint32_t> first, vertices;
     };
@@ -65,7 +68,9 @@ private:
     void push(std::uint32_t a, std::uint32_t b, Buckets& queue) const;
     bool may_move(std::uint32_t a, std::uint32_t b) const;
     bool try_collapse(std::uint32_t a, std::uint32_t b);
-    bool legal(std::uint32_t b, const Ring& ring) const;
+    bool legal(std::uint32_t b, const Ring& ring);
+    const Room& room(std::uint32_t v);
+    bool fits_alone(std::uint32_t b, std::uint32_t v, std::uint32_t w) const;
     bool may_fit(std::uint32_t a, std::uint32_t b) const;
     bool shapely(std::uint32_t a, std::uint32_t b, const Ring& ring) const;
     float cost(std::uint32_t a, std::uint32_t b) const;
@@ -80,11 +85,20 @@ private:
     std::vector<std::uint8_t> inner_; ///< the ring lies in the block of the vertex
     std::vector<std::uint8_t> open_;  ///< not yet tried with its whole ring in one block
     std::vector<std::uint8_t> off_;
-    std::vector<float> clear_m_; ///< FaceErrors::clearance()
+    std::vector<Room> rooms_;
     struct Slope {
         std::uint32_t shape = FaceErrors::kNone;
         std::array<float, 3> gradient{};
+        Vec3 at() const { return {gradient[0], gradient[1], gradient[2]}; }
     };
+    /// The cubic along an edge with the gradients at its ends, where it is 0.
+    struct Bend {
+        double middle = 0, skew = 0; ///< its value half way, and how far it is from a parabola
+    };
+    static Bend bend(const Slope& s, const Slope& t, const Vec3& edge) {
+        const double from = dot(s.at(), edge), to = dot(t.at(), edge);
+        return {(from - to) / 8, (from + to) / 8};
+    }
     std::vector<Slope> slopes_; ///< of the one primitive that a vertex lies on, if not a ball
 };
 

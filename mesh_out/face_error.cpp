@@ -110,22 +110,32 @@ double FaceErrors::bound_beside(std::uint32_t shape, const Range& range, const C
     return most;
 }
 
-double FaceErrors::clearance(const Vec3& p, std::uint32_t label) const {
+FaceErrors::Clearance FaceErrors::clearance(const Vec3& p, std::uint32_t label) const {
     const std::array<int, 3> at = {coordinate(p.x, 0), coordinate(p.y, 1), coordinate(p.z, 2)};
     const auto list = near(at);
-    double least = pad_; // the lists know no more
     const double off_center = length(p - center_of(at));
+    const double known = list_reach() - off_center; // the lists know no more
+    Clearance least{known, known};
     for (const std::uint32_t& shape : list) {
         const Shape& s = shapes_[shape];
-        if (s.is_ball || sets_[label].has(shape))
+        if (sets_[label].has(shape))
             continue;
+        if (s.is_ball) {
+            least.any = std::min(least.any, std::abs(length(p - s.center) - s.radius));
+            continue;
+        }
         const double value = center_values_[static_cast<std::size_t>(&shape - near_.data())];
         const double at_least = std::abs(value) - off_center;
-        least =
-            std::min(least, at_least > 2 * spacing_ ? at_least
+        least.sampled = std::min(least.sampled, at_least > 2 * spacing_
+                                                    ? at_least
                                                     : std::abs(field_.of(s.primitive, p).value_m));
     }
+    least.any = std::min(least.any, least.sampled);
     return least;
+}
+
+double FaceErrors::reach_m(const Rules& rules) const {
+    return rules.face_m + kTouch * spacing_;
 }
 
 std::uint32_t FaceErrors::own(const Corners& face, const Labels& labels, bool exact_corners,

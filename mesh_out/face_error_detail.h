@@ -48,10 +48,26 @@ public:
         double turn_cosine = -1;   ///< of the angle to the gradient at the middle, at least
         bool exact_corners = true; ///< corners lie on all their primitives
         bool may_pierce = false;   ///< faces may pass through other primitives, within `rim_m`
-        double clear_m = 0;        ///< clearance() of the first corner, or less
+        double clear_m = 0;        ///< clearance().sampled of the first corner, or less
     };
-    /// The primitives without a closed form that a vertex does not lie on are at least so far.
-    double clearance(const Vec3& p, std::uint32_t label) const;
+    /// How far the primitives at least are that a vertex does not lie on.
+    struct Clearance {
+        double sampled = 0; ///< those without a closed form
+        double any = 0;
+    };
+    Clearance clearance(const Vec3& p, std::uint32_t label) const;
+    /// Whether a face with its corners on one ball, and nothing else near, surely keeps `rules`:
+    /// told by its plane, which is nearer to the centre than the face. \param normal  of any
+    /// length.
+    bool fits_ball(std::uint32_t shape, const Vec3& corner, const Vec3& normal,
+                   const Rules& rules) const {
+        const Shape& s = shapes_[shape];
+        const double area = length(normal), h = s.sign * dot(normal, corner - s.center),
+                     r = s.radius * area;
+        return r - h <= (rules.centred ? 2 : 1) * rules.face_m * area && h >= rules.turn_cosine * r;
+    }
+    /// How far a face may be from its primitive to keep `rules`, and still touch nothing else.
+    double reach_m(const Rules& rules) const;
     /// An upper bound of the distance from the points of a face to the surface of the solid, as far
     /// as `rules` ask: infinite when it breaks them. Balls by closed forms, other primitives by
     /// samples with a margin of their second differences; past a rim, the distance to the rim.
@@ -76,6 +92,7 @@ public:
     bool has_closed_form(std::uint32_t shape) const { return shapes_[shape].is_ball; }
 
 private:
+    static constexpr double kHalfDiagonal = 0.8660254037844386; ///< of a cell of edge 1
     struct Shape {
         Primitive primitive = 0;
         bool is_ball = false;
@@ -115,6 +132,8 @@ private:
             return {};
         return std::span(near_).subspan(first_[list], first_[list + 1] - first_[list]);
     }
+    /// From the centre of a cell: what is nearer is in its list.
+    double list_reach() const { return kHalfDiagonal * cell_ + pad_; }
     std::size_t cell_of(const std::array<int, 3>& c) const {
         return (static_cast<std::size_t>(c[0]) * n_[1] + static_cast<std::size_t>(c[1])) * n_[2] +
                static_cast<std::size_t>(c[2]);

@@ -70,10 +70,9 @@ void FaceErrors::find_near(const LabelledMesh& mesh, std::vector<std::vector<Pri
             listed.push_back(c);
         }
     near.resize(listed.size());
-    const double half_diagonal = std::sqrt(3.) / 2 * cell_;
     tbb::parallel_for(tbb::blocked_range<std::size_t>(0, listed.size(), 64), [&](const auto& r) {
         for (std::size_t i = r.begin(); i < r.end(); ++i) {
-            field_.near(center_of(coordinates(listed[i])), half_diagonal + pad_, near[i]);
+            field_.near(center_of(coordinates(listed[i])), list_reach(), near[i]);
         }
     });
 }
