@@ -1,7 +1,7 @@
 #pragma once
 #include <cstddef>
 #include <cstdint>
-#include <span>
+#include <memory>
 #include <vector>
 
 #include "mesh_out/labelled_mesh.h"
@@ -9,6 +9,8 @@
 #include "vdb_ops/field_probe.h"
 
 namespace taihu {
+
+class CornerTable;
 
 struct BoundedSettings {
     double spacing_m = 0;     ///< of the lattice that the mesh was made on [m], > 0
@@ -58,12 +60,16 @@ public:
     BoundedMesh to_triangles(std::size_t n, Progress* progress = nullptr);
 
 private:
-    LabelledMesh collapse(double bound_m, std::span<const std::uint8_t> frozen,
-                          Progress* progress) const;
-    /// \param collapsed  becomes the surface before it is balanced and mended.
-    BoundedMesh level(double bound_m, LabelledMesh& collapsed, Progress* progress) const;
+    /// A mesh of exact vertices with its corner table.
+    struct Surface {
+        LabelledMesh mesh;
+        std::shared_ptr<const CornerTable> table;
+    };
 
-    LabelledMesh mesh_; ///< on the surface, of the last level
+    /// \param collapsed  becomes the surface before it is balanced and mended.
+    BoundedMesh level(double bound_m, Surface& collapsed, Progress* progress) const;
+
+    Surface surface_; ///< of the last level
     const FieldProbe& field_;
     BoundedSettings settings_;
     double bound_m_ = 0; ///< of the last level

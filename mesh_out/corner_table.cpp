@@ -53,22 +53,29 @@ CornerTable::CornerTable(std::size_t n_vertices, std::span<const Triangle> trian
     const Incidence incidence(n_vertices, vertices_);
     std::atomic<bool> broken{false};
     tbb::parallel_for(tbb::blocked_range<std::size_t>(0, n_vertices, 4096), [&](const auto& range) {
+        std::vector<std::uint32_t> to, from; // the other ends of the edges of each corner
         for (std::size_t v = range.begin(); v < range.end(); ++v) {
             const auto around = incidence.of(v);
             if (!around.empty())
                 corners_[v] = around.front();
+            to.clear();
+            from.clear();
             for (const std::uint32_t c : around) {
-                const std::uint32_t to = vertices_[next(c)];
+                to.push_back(vertices_[next(c)]);
+                from.push_back(vertices_[previous(c)]);
+            }
+            for (std::size_t i = 0; i < around.size(); ++i) {
                 int n_out = 0, n_in = 0;
-                for (const std::uint32_t d : around) {
-                    n_out += vertices_[next(d)] == to;
-                    if (vertices_[previous(d)] == to) {
-                        opposites_[previous(c)] = next(d);
-                        ++n_in;
-                    }
+                std::size_t other = 0;
+                for (std::size_t k = 0; k < around.size(); ++k) {
+                    n_out += to[k] == to[i];
+                    n_in += from[k] == to[i];
+                    other = from[k] == to[i] ? k : other;
                 }
                 if (n_out != 1 || n_in != 1)
                     broken = true;
+                else
+                    opposites_[previous(around[i])] = next(around[other]);
             }
         }
     });

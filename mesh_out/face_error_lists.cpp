@@ -1,5 +1,6 @@
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <tuple>
 
 #include <tbb/blocked_range.h>
@@ -97,7 +98,8 @@ void FaceErrors::find_center_values() {
 
 void FaceErrors::find_shapes(const LabelledMesh& mesh) {
     std::vector<Primitive> used = near_;
-    std::vector<PrimitiveSet> all = mesh.labels;
+    std::vector<PrimitiveSet> all; // neighbours mostly share theirs
+    std::unique_copy(mesh.labels.begin(), mesh.labels.end(), std::back_inserter(all));
     std::sort(all.begin(), all.end(), before);
     all.erase(std::unique(all.begin(), all.end()), all.end());
     for (const PrimitiveSet& set : all)
@@ -127,10 +129,16 @@ void FaceErrors::find_shapes(const LabelledMesh& mesh) {
         sets_.push_back(shapes);
     }
     labels_.resize(mesh.labels.size());
-    tbb::parallel_for(std::size_t{0}, labels_.size(), [&](std::size_t v) {
-        labels_[v] = static_cast<std::uint32_t>(
-            std::lower_bound(all.begin(), all.end(), mesh.labels[v], before) - all.begin());
-    });
+    tbb::parallel_for(
+        tbb::blocked_range<std::size_t>(0, labels_.size(), 1024), [&](const auto& range) {
+            for (std::size_t v = range.begin(); v < range.end(); ++v)
+                labels_[v] =
+                    v > range.begin() && mesh.labels[v] == mesh.labels[v - 1]
+                        ? labels_[v - 1]
+                        : static_cast<std::uint32_t>(
+                              std::lower_bound(all.begin(), all.end(), mesh.labels[v], before) -
+                              all.begin());
+        });
 }
 
 /// The number of a primitive's shape; kNone when it comes near nothing.

@@ -26,10 +26,9 @@ constexpr double kLeastTurn = 0.2; ///< cosine of how far a split may turn a fac
 
 class Repair {
 public:
-    explicit Repair(BoundedSurface& surface) : s_(surface), n_old_(surface.positions.size()) {
-        errors_.assign(s_.table.n_triangles(), 0);
-        dirty_.assign(errors_.size(), 1);
-    }
+    explicit Repair(BoundedSurface& surface)
+        : start_(surface), s_(surface), errors_(surface.face_errors), dirty_(surface.dirty),
+          n_old_(surface.positions.size()) {}
     Repaired run(Progress* progress);
 
 private:
@@ -42,7 +41,8 @@ private:
     std::uint32_t longest(std::size_t face) const;
     std::vector<UnresolvedPlace> places(const std::vector<std::uint8_t>& bad) const;
 
-    BoundedSurface& s_;
+    BoundedSurface& start_;
+    BoundedSurface s_;
     std::vector<double> errors_; ///< per face
     std::vector<std::uint8_t> dirty_;
     std::size_t n_old_;                   ///< vertices before any split
@@ -206,6 +206,10 @@ Repaired Repair::run(Progress* progress) {
             bad[f] = meets[f] || !(errors_[f] <= s_.bound_m);
         // What crosses stays in question until it does no more.
         dirty_ = meets;
+        if (round == 0) {
+            start_.face_errors = errors_;
+            start_.dirty = dirty_;
+        }
         bool changed = false;
         for (std::size_t f = 0; round < kRounds && f < bad.size(); ++f)
             if (bad[f])
@@ -266,6 +270,20 @@ std::vector<UnresolvedPlace> Repair::places(const std::vector<std::uint8_t>& bad
 }
 
 } // namespace
+
+void keep(BoundedSurface& s, const std::vector<std::uint8_t>& more) {
+    for (std::uint32_t v = 0; v < more.size(); ++v) {
+        if (!more[v] || s.kept[v])
+            continue;
+        s.kept[v] = 1;
+        s.positions[v] = s.exact[v];
+        std::uint32_t c = s.table.corner(v);
+        do {
+            s.dirty[c / 3] = 1;
+            c = s.table.swing(c);
+        } while (c != s.table.corner(v));
+    }
+}
 
 Repaired repair(BoundedSurface& surface, Progress* progress) {
     return Repair(surface).run(progress);
