@@ -87,6 +87,7 @@ BoundedSimplifier::BoundedSimplifier(LabelledMesh mesh, const FieldProbe& field,
 }
 
 BoundedMesh BoundedSimplifier::level(double bound_m, Surface& collapsed, Progress* progress) const {
+    report_stage(progress, "simplify");
     const LabelledMesh& from = surface_.mesh;
     FaceErrors errors(from, field_, bound_m, settings_.spacing_m);
     Collapser::Rules rules;
@@ -98,7 +99,8 @@ BoundedMesh BoundedSimplifier::level(double bound_m, Surface& collapsed, Progres
     std::vector<std::uint8_t> frozen(from.positions.size(), 0);
     std::vector<Sphere> crossings;
     for (int freeze = 0;; ++freeze) {
-        report_stage(progress, "simplify");
+        if (freeze > 0)
+            report_stage(progress, "simplify");
         Collapsed fewer;
         {
             CornerTable table = *surface_.table;

@@ -93,7 +93,7 @@ Collapser::Collapser(CornerTable& table, std::span<const Vec3> positions,
                 for (const std::uint32_t shape : shapes) {
                     const FieldProbe::Value at = errors_.of(shape, p);
                     off_[v] |= std::abs(at.value_m) > rules_.off_m;
-                    if (shapes.size() == 1 && !errors_.has_closed_form(shape))
+                    if (slopes_[v].shape == FaceErrors::kNone && !errors_.has_closed_form(shape))
                         slopes_[v] = {shape,
                                       {static_cast<float>(at.gradient.x),
                                        static_cast<float>(at.gradient.y),
@@ -255,7 +255,9 @@ bool Collapser::try_collapse(std::uint32_t a, std::uint32_t b) {
 /// middle is near enough; spares most of the samples that would say no.
 bool Collapser::may_fit(std::uint32_t a, std::uint32_t b) const {
     const Slope &s = slopes_[a], &t = slopes_[b];
-    if (s.shape == FaceErrors::kNone || s.shape != t.shape)
+    if (s.shape == FaceErrors::kNone || s.shape != t.shape ||
+        errors_.n_primitives(errors_.labels()[a]) > 1 ||
+        errors_.n_primitives(errors_.labels()[b]) > 1)
         return true;
     const double at_middle = bend(s, t, positions_[b] - positions_[a]).middle;
     return std::abs(at_middle) <= kHope * (rules_.face.centred ? 2 : 1) * rules_.face.face_m;
@@ -295,54 +297,78 @@ const Collapser::Room& Collapser::room(std::uint32_t v) {
     return room;
 }
 
-/// Whether a face on one primitive surely fits a ball; on others, whether the parabolas through the
-/// values and gradients at its corners leave no doubt.
-bool Collapser::fits_alone(std::uint32_t b, std::uint32_t v, std::uint32_t w) const {
-    const Vec3 &p = positions_[b], &q = positions_[v], &r = positions_[w];
-    const Vec3 n = cross(q - p, r - p);
-    const std::uint32_t shape = errors_.shapes(errors_.labels()[b])[0];
-    if (errors_.has_closed_form(shape))
-        return errors_.fits_ball(shape, p, n, rules_.face);
-    const Slope &s = slopes_[b], &t = slopes_[v], &u = slopes_[w];
-    const std::array<Bend, 3> bends = {bend(s, t, q - p), bend(t, u, r - q), bend(u, s, p - r)};
-    double lo = 0, hi = 0, sum = 0, skew = 0;
-    for (const Bend& at : bends) {
-        lo = std::min(lo, at.middle);
-        hi = std::max(hi, at.middle);
+/// Of a face on a primitive without a closed form, by the parabolas through the values and
+/// gradients at its corners: spares most of the samples.
+Collapser::Verdict Collapser::estimate(std::uint32_t shape, const Triangle& face,
+                                       FaceErrors::Range& range) const {
+    const std::array<Vec3, 3> p = {positions_[face[0]], positions_[face[1]], positions_[face[2]]};
+    double sum = 0, skew = 0;
+    range = {};
+    for (std::size_t k = 0; k < 3; ++k) {
+        const Slope &s = slopes_[face[k]], &t = slopes_[face[(k + 1) % 3]];
+        if (s.shape != shape)
+            return Verdict::unknown;
+        const Bend at = bend(s, t, p[(k + 1) % 3] - p[k]);
+        range.lo = std::min(range.lo, at.middle);
+        range.hi = std::max(range.hi, at.middle);
+        range.gradient += s.at();
         sum += at.middle;
         skew = std::max(skew, std::abs(at.skew));
     }
-    lo = std::min(lo, 4. / 9 * sum) - skew;
-    hi = std::max(hi, 4. / 9 * sum) + skew;
-    const double most = rules_.face.centred ? (hi - lo) / 2 : std::max(-lo, hi);
-    if (!(most <= kNoDoubt * rules_.face.face_m))
+    range.lo = std::min(range.lo, 4. / 9 * sum);
+    range.hi = std::max(range.hi, 4. / 9 * sum);
+    const auto over = [&](double more) {
+        return (rules_.face.centred ? (range.hi - range.lo) / 2 : range.most()) + more >
+               rules_.face.face_m;
+    };
+    const double limit = rules_.face.face_m;
+    if (over((1 - kHope) * limit))
+        return Verdict::no;
+    return over((1 - kNoDoubt) * limit + skew) || length(range.gradient) < kSmooth
+               ? Verdict::unknown
+               : Verdict::yes;
+}
+
+/// Whether a face keeps the rules. \param clear_m  from its first corner, to other primitives.
+bool Collapser::fits(const Triangle& face, double clear_m, const FaceErrors::Rules& rules) const {
+    const auto& labels = errors_.labels();
+    const FaceErrors::Labels l = {labels[face[0]], labels[face[1]], labels[face[2]]};
+    const FaceErrors::Corners p = {positions_[face[0]], positions_[face[1]], positions_[face[2]]};
+    constexpr double kBroken = std::numeric_limits<double>::infinity();
+    const PrimitiveSet shared = errors_.shared(l);
+    if (shared.size() != 1 || !rules.exact_corners)
+        return errors_.bound(p, l, rules) < kBroken;
+    const bool alone = clear_m > 0 && std::max(length_squared(p[1] - p[0]),
+                                               length_squared(p[2] - p[0])) < clear_m * clear_m;
+    const std::uint32_t shape = shared[0];
+    const Vec3 n = cross(p[1] - p[0], p[2] - p[0]);
+    if (errors_.has_closed_form(shape))
+        return (alone && errors_.fits_ball(shape, p[0], n, rules)) ||
+               errors_.bound(p, l, rules) < kBroken;
+    FaceErrors::Range range;
+    const Verdict verdict = estimate(shape, face, range);
+    if (verdict == Verdict::unknown)
+        return errors_.bound(p, l, rules) < kBroken;
+    if (verdict == Verdict::no ||
+        dot(n, range.gradient) < rules.turn_cosine * length(n) * length(range.gradient))
         return false;
-    const Vec3 g = s.at() + t.at() + u.at();
-    const double slope = length(g);
-    return slope > kSmooth && dot(n, g) >= rules_.face.turn_cosine * length(n) * slope;
+    return alone || errors_.bound_beside(shape, range, p, l, rules) < kBroken;
 }
 
 bool Collapser::legal(std::uint32_t b, const Ring& ring) {
-    const auto& labels = errors_.labels();
     FaceErrors::Rules rules = rules_.face;
     const Room& room_b = room(b);
     rules.clear_m = static_cast<double>(room_b.sampled_m);
-    const bool is_single = errors_.n_primitives(labels[b]) == 1;
-    const double free_m = static_cast<double>(room_b.any_m) - errors_.reach_m(rules);
+    const double clear = errors_.n_primitives(errors_.labels()[b]) == 1
+                             ? static_cast<double>(room_b.any_m) - errors_.reach_m(rules)
+                             : 0;
     for (const std::uint32_t c : ring.all()) {
         const std::uint32_t v = table_.vertex(CornerTable::next(c)),
                             w = table_.vertex(CornerTable::previous(c));
         if (v == b || w == b)
             continue;
-        const Vec3 &p = positions_[b], &q = positions_[v], &r = positions_[w];
         rules.exact_corners = !off_[v] && !off_[w];
-        if (is_single && rules.exact_corners && labels[v] == labels[b] && labels[w] == labels[b] &&
-            free_m > 0 &&
-            std::max(length_squared(q - p), length_squared(r - p)) < free_m * free_m &&
-            fits_alone(b, v, w))
-            continue;
-        if (errors_.bound({p, q, r}, {labels[b], labels[v], labels[w]}, rules) ==
-            std::numeric_limits<double>::infinity())
+        if (!fits({b, v, w}, clear, rules))
             return false;
     }
     return true;

@@ -70,7 +70,9 @@ private:
     bool try_collapse(std::uint32_t a, std::uint32_t b);
     bool legal(std::uint32_t b, const Ring& ring);
     const Room& room(std::uint32_t v);
-    bool fits_alone(std::uint32_t b, std::uint32_t v, std::uint32_t w) const;
+    bool fits(const Triangle& face, double clear_m, const FaceErrors::Rules& rules) const;
+    enum class Verdict { yes, no, unknown };
+    Verdict estimate(std::uint32_t shape, const Triangle& face, FaceErrors::Range& range) const;
     bool may_fit(std::uint32_t a, std::uint32_t b) const;
     bool shapely(std::uint32_t a, std::uint32_t b, const Ring& ring) const;
     float cost(std::uint32_t a, std::uint32_t b) const;
@@ -99,7 +101,7 @@ private:
         const double from = dot(s.at(), edge), to = dot(t.at(), edge);
         return {(from - to) / 8, (from + to) / 8};
     }
-    std::vector<Slope> slopes_; ///< of the one primitive that a vertex lies on, if not a ball
+    std::vector<Slope> slopes_; ///< of the first primitive without a closed form at a vertex
 };
 
 } // namespace taihu

@@ -35,6 +35,11 @@ double longest_edge(const FaceErrors::Corners& f) {
         {length_squared(f[0] - f[1]), length_squared(f[1] - f[2]), length_squared(f[2] - f[0])}));
 }
 
+std::size_t steps(const FaceErrors::Corners& f, double step) {
+    return std::clamp(static_cast<std::size_t>(std::ceil(longest_edge(f) / step)), std::size_t{2},
+                      kMostSteps);
+}
+
 std::array<FaceErrors::Corners, 4> quarters(const FaceErrors::Corners& f) {
     const Vec3 ab = (f[0] + f[1]) * .5, bc = (f[1] + f[2]) * .5, ca = (f[2] + f[0]) * .5;
     return {{{f[0], ab, ca}, {ab, f[1], bc}, {ca, bc, f[2]}, {ab, bc, ca}}};
@@ -62,7 +67,6 @@ double FaceErrors::bound(const Corners& face, const Labels& labels, const Rules&
     return shape == kNone ? kInfinity : bound_beside(shape, range, face, labels, rules);
 }
 
-/// As bound(), of a face on a known primitive.
 double FaceErrors::bound_beside(std::uint32_t shape, const Range& range, const Corners& face,
                                 const Labels& labels, const Rules& rules) const {
     double most = rules.centred ? (range.hi - range.lo) / 2 : range.most();
@@ -142,10 +146,8 @@ std::uint32_t FaceErrors::own(const Corners& face, const Labels& labels, bool ex
                               Range& out, double give_up_m) const {
     std::uint32_t best = kNone;
     double least = kInfinity;
-    for (const std::uint32_t s : sets_[labels[0]].all()) {
-        if ((labels[1] != labels[0] && !sets_[labels[1]].has(s)) ||
-            (labels[2] != labels[0] && !sets_[labels[2]].has(s)))
-            continue;
+    const PrimitiveSet candidates = shared(labels);
+    for (const std::uint32_t s : candidates.all()) {
         constexpr CornerValues kOnIt{};
         const Range r = range(s, face, exact_corners ? &kOnIt : nullptr, give_up_m);
         if (r.most() < least) {
@@ -194,8 +196,7 @@ double FaceErrors::sample(Primitive primitive, const Vec3& p, Range& range) cons
 FaceErrors::Range FaceErrors::sampled_range(const Shape& shape, const Corners& f,
                                             const CornerValues* known, double give_up_m,
                                             double step) const {
-    const std::size_t n = std::clamp(static_cast<std::size_t>(std::ceil(longest_edge(f) / step)),
-                                     std::size_t{2}, kMostSteps);
+    const std::size_t n = steps(f, step);
     std::array<double, (kMostSteps + 1) * (kMostSteps + 1)> values;
     const auto at = [&](std::size_t u, std::size_t v) -> double& {
         return values[u * (kMostSteps + 1) + v];
@@ -235,6 +236,21 @@ FaceErrors::Range FaceErrors::sampled_range(const Shape& shape, const Corners& f
     r.lo -= r.lo < 0 ? bend / 8 : 0;
     r.hi += r.hi > 0 ? bend / 8 : 0;
     return r;
+}
+
+std::size_t FaceErrors::n_steps(const Corners& f) const {
+    return steps(f, kStep * spacing_);
+}
+
+void FaceErrors::samples(std::uint32_t shape, const Corners& f, std::size_t n, float* out) const {
+    Range ignored;
+    for (std::size_t u = 0; u <= n; ++u)
+        for (std::size_t v = 0; u + v <= n; ++v) {
+            const double x = static_cast<double>(u) / static_cast<double>(n),
+                         y = static_cast<double>(v) / static_cast<double>(n);
+            *out++ = static_cast<float>(sample(shapes_[shape].primitive,
+                                               f[1] * x + f[2] * y + f[0] * (1 - x - y), ignored));
+        }
 }
 
 double FaceErrors::against(std::uint32_t own, const Range& own_range, std::uint32_t other,

@@ -73,11 +73,28 @@ public:
     /// samples with a margin of their second differences; past a rim, the distance to the rim.
     double bound(const Corners& face, const Labels& labels, const Rules& rules) const;
 
-    /// The primitives that all three corners share and, of those, the nearest to the face; kNone
-    /// where there is none.
+    /// As bound(), of a face on a known primitive with a known range.
+    double bound_beside(std::uint32_t shape, const Range& range, const Corners& face,
+                        const Labels& labels, const Rules& rules) const;
+
+    /// The shapes that all three corners lie on.
+    PrimitiveSet shared(const Labels& labels) const {
+        if (labels[0] == labels[1] && labels[1] == labels[2])
+            return sets_[labels[0]];
+        return sets_[labels[0]].common(sets_[labels[1]]).common(sets_[labels[2]]);
+    }
+    /// Of these the nearest to the face; kNone where there is none.
     /// Values beyond `give_up_m` may end the search for the range.
     std::uint32_t own(const Corners& face, const Labels& labels, bool exact_corners, Range& range,
                       double give_up_m = kFar) const;
+    using CornerValues = std::array<double, 3>;
+    Range range(std::uint32_t shape, const Corners& face, const CornerValues* known = nullptr,
+                double give_up_m = kFar) const;
+    /// How many steps along an edge of a face samples of a primitive take.
+    std::size_t n_steps(const Corners& face) const;
+    /// Values at (n + 1)(n + 2) / 2 points: f1 x + f2 y + f0 (1 - x - y), y from 0 to 1 - x for
+    /// each x from 0 to 1, in steps of 1 / n.
+    void samples(std::uint32_t shape, const Corners& face, std::size_t n, float* out) const;
     FieldProbe::Value of(std::uint32_t shape, const Vec3& p) const;
     const PrimitiveSet& set(std::uint32_t label) const { return sets_[label]; }
     std::span<const std::uint32_t> shapes(std::uint32_t label) const { return sets_[label].all(); }
@@ -111,17 +128,12 @@ private:
     void find_center_values();
     std::array<int, 3> coordinates(std::size_t cell) const;
     void find_near(const LabelledMesh& mesh, std::vector<std::vector<Primitive>>& near);
-    using CornerValues = std::array<double, 3>;
-    Range range(std::uint32_t shape, const Corners& face, const CornerValues* known = nullptr,
-                double give_up_m = kFar) const;
     double sample(Primitive primitive, const Vec3& p, Range& range) const;
     Range sampled_range(const Shape& shape, const Corners& face, const CornerValues* known,
                         double give_up_m, double step) const;
     double past_rim(const Meeting& meeting, const Corners& face, double own, double other) const;
     double meeting(const Meeting& meeting, const Corners& face, const Range& own,
                    const Range& other, int depth) const;
-    double bound_beside(std::uint32_t shape, const Range& range, const Corners& face,
-                        const Labels& labels, const Rules& rules) const;
     std::uint32_t shape_of(Primitive primitive) const;
     bool is_sure_of_side(std::uint32_t own, const CornerValues& other, const Corners& face) const;
     double against(std::uint32_t own, const Range& own_range, std::uint32_t other,
