@@ -1,6 +1,7 @@
 #pragma once
 #include <array>
 #include <cstdint>
+#include <map>
 #include <optional>
 #include <span>
 #include <vector>
@@ -164,6 +165,8 @@ private:
     std::vector<float> center_values_;        ///< of these at the cell's centre, of balls 0
     std::vector<Shape> shapes_;
     std::vector<PrimitiveSet> sets_; ///< of shapes, by label number
+    std::size_t n_sorted_sets_ = 0;
+    std::map<std::vector<std::uint32_t>, std::uint32_t> more_sets_; ///< numbers of the others
     std::vector<std::uint32_t> labels_;
 };
 

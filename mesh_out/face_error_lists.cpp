@@ -128,6 +128,7 @@ void FaceErrors::find_shapes(const LabelledMesh& mesh) {
             shapes.add(shape_of(p));
         sets_.push_back(shapes);
     }
+    n_sorted_sets_ = sets_.size();
     labels_.resize(mesh.labels.size());
     tbb::parallel_for(
         tbb::blocked_range<std::size_t>(0, labels_.size(), 1024), [&](const auto& range) {
@@ -151,11 +152,16 @@ std::uint32_t FaceErrors::shape_of(Primitive primitive) const {
 }
 
 std::uint32_t FaceErrors::label_of(const PrimitiveSet& shapes) {
-    const auto at = std::find(sets_.begin(), sets_.end(), shapes);
-    const auto number = static_cast<std::uint32_t>(at - sets_.begin());
-    if (at == sets_.end())
+    // The first ones are sorted as their primitives are.
+    const auto first_end = sets_.begin() + static_cast<std::ptrdiff_t>(n_sorted_sets_);
+    const auto at = std::lower_bound(sets_.begin(), first_end, shapes, before);
+    if (at != first_end && *at == shapes)
+        return static_cast<std::uint32_t>(at - sets_.begin());
+    const auto [known, is_new] = more_sets_.try_emplace({shapes.all().begin(), shapes.all().end()},
+                                                        static_cast<std::uint32_t>(sets_.size()));
+    if (is_new)
         sets_.push_back(shapes);
-    return number;
+    return known->second;
 }
 
 PrimitiveSet FaceErrors::primitives(std::uint32_t label) const {

@@ -251,7 +251,8 @@ std::vector<UnresolvedPlace> Repair::places(const std::vector<std::uint8_t>& bad
         while (!open.empty()) {
             const std::size_t f = open.back();
             open.pop_back();
-            error = std::max(error, s_.errors.searched(s_.corners(f), 1.5 * s_.bound_m));
+            const double enough = std::max(error, 1.5 * s_.bound_m);
+            error = std::max(error, s_.errors.searched(s_.corners(f), enough));
             for (const std::uint32_t v : s_.table.triangle(f)) {
                 box.include(s_.positions[v]);
                 std::uint32_t c = s_.table.corner(v);
