@@ -102,7 +102,8 @@ bool CornerTable::ring(std::uint32_t v, Ring& out) const {
     do {
         if (out.n == kMostCorners)
             return false;
-        out.corners[out.n++] = c;
+        out.corners[out.n] = c;
+        out.neighbours[out.n++] = vertices_[next(c)];
         c = swing(c);
     } while (c != corners_[v]);
     return true;
@@ -112,12 +113,12 @@ std::uint32_t CornerTable::collapsible(std::uint32_t a, std::uint32_t b, const R
                                        const Ring& ring_b) const {
     std::uint32_t edge = kNone;
     int n_common = 0;
-    for (const std::uint32_t c : ring_a.all()) {
-        const std::uint32_t v = vertices_[next(c)];
+    for (std::size_t i = 0; i < ring_a.n; ++i) {
+        const std::uint32_t v = ring_a.neighbours[i];
         if (v == b)
-            edge = c;
-        for (const std::uint32_t d : ring_b.all())
-            n_common += vertices_[next(d)] == v;
+            edge = ring_a.corners[i];
+        for (std::size_t k = 0; k < ring_b.n; ++k)
+            n_common += ring_b.neighbours[k] == v;
     }
     if (edge == kNone || n_common != 2)
         return kNone;
