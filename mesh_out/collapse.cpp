@@ -19,7 +19,6 @@ constexpr float kLengthWeight = 1e-3f; ///< on what is flat, short edges go firs
 constexpr float kAtOnce = 1e-20f, kNever = 1e30f;
 constexpr double kHope = 1.25;   ///< how far over its estimate an error may still turn out to fit
 constexpr double kNoDoubt = 0.8; ///< how far below the bound an estimate is taken for the error
-constexpr double kSmooth = 2.85; ///< length of the sum of three gradients of 1 that differ little
 constexpr double kMostBlocks = 1 << 22;
 
 } // namespace
@@ -143,8 +142,28 @@ Collapser::Blocks Collapser::divide(double block_m, double shift_m) {
     return blocks;
 }
 
+/// A collapse takes place among inner vertices and leaves them inner, so this is known once a pass.
+void Collapser::find_inner() {
+    std::fill(inner_.begin(), inner_.end(), std::uint8_t{1});
+    tbb::parallel_for(
+        tbb::blocked_range<std::size_t>(0, table_.n_triangles(), 4096), [&](const auto& range) {
+            for (std::size_t t = range.begin(); t < range.end(); ++t) {
+                if (!table_.has_triangle(t))
+                    continue;
+                const Triangle v = table_.triangle(t);
+                if (owners_[v[0]] == owners_[v[1]] && owners_[v[1]] == owners_[v[2]])
+                    continue;
+                for (std::size_t k = 0; k < 3; ++k)
+                    if (owners_[v[k]] != owners_[v[(k + 1) % 3]])
+                        for (const std::uint32_t end : {v[k], v[(k + 1) % 3]})
+                            std::atomic_ref(inner_[end]).store(0, std::memory_order_relaxed);
+            }
+        });
+}
+
 void Collapser::pass(double block_m, double shift_m, Progress* progress) {
     const Blocks blocks = divide(block_m, shift_m);
+    find_inner();
     tbb::enumerable_thread_specific<Buckets> queues;
     std::atomic<std::size_t> n_done{0};
     const std::size_t n = blocks.first.size() - 1, step = std::max<std::size_t>(1, n / 100);
@@ -168,12 +187,6 @@ void Collapser::run(std::span<const std::uint32_t> vertices, Buckets& queue) {
             c = table_.swing(c);
         } while (c != table_.corner(v));
     };
-    // A collapse takes place among inner vertices and leaves them inner, so this is known once.
-    for (const std::uint32_t v : vertices) {
-        bool inner = true;
-        each_neighbour(v, [&](std::uint32_t u) { inner = inner && owners_[u] == owners_[v]; });
-        inner_[v] = inner;
-    }
     for (const std::uint32_t v : vertices)
         if (inner_[v])
             each_neighbour(v, [&](std::uint32_t u) {
@@ -247,11 +260,11 @@ bool Collapser::try_collapse(std::uint32_t a, std::uint32_t b) {
 /// Whether the cubic through the values and gradients at both ends of an edge leaves hope that its
 /// middle is near enough; spares most of the samples that would say no.
 bool Collapser::may_fit(std::uint32_t a, std::uint32_t b) const {
-    const Slope &s = slopes_[a], &t = slopes_[b];
+    const FaceErrors::Slope &s = slopes_[a], &t = slopes_[b];
     if (s.shape == FaceErrors::kNone || s.shape != t.shape ||
         errors_.n_primitives(nodes_[a].label) > 1 || errors_.n_primitives(nodes_[b].label) > 1)
         return true;
-    const double at_middle = bend(s, t, positions_[b] - positions_[a]).middle;
+    const double at_middle = dot(s.at() - t.at(), positions_[b] - positions_[a]) / 8;
     return std::abs(at_middle) <= kHope * (rules_.face.centred ? 2 : 1) * rules_.face.face_m;
 }
 
@@ -285,62 +298,36 @@ const Collapser::Room& Collapser::room(std::uint32_t v) {
     return room;
 }
 
-/// Of a face on a primitive without a closed form, by the parabolas through the values and
-/// gradients at its corners: spares most of the samples.
-Collapser::Verdict Collapser::estimate(std::uint32_t shape, const Triangle& face,
-                                       FaceErrors::Range& range) const {
-    const std::array<Vec3, 3> p = {positions_[face[0]], positions_[face[1]], positions_[face[2]]};
-    double sum = 0, skew = 0;
-    range = {};
-    for (std::size_t k = 0; k < 3; ++k) {
-        const Slope &s = slopes_[face[k]], &t = slopes_[face[(k + 1) % 3]];
-        if (s.shape != shape)
-            return Verdict::unknown;
-        const Bend at = bend(s, t, p[(k + 1) % 3] - p[k]);
-        range.lo = std::min(range.lo, at.middle);
-        range.hi = std::max(range.hi, at.middle);
-        range.gradient += s.at();
-        sum += at.middle;
-        skew = std::max(skew, std::abs(at.skew));
-    }
-    range.lo = std::min(range.lo, 4. / 9 * sum);
-    range.hi = std::max(range.hi, 4. / 9 * sum);
-    const auto over = [&](double more) {
-        return (rules_.face.centred ? (range.hi - range.lo) / 2 : range.most()) + more >
-               rules_.face.face_m;
-    };
-    const double limit = rules_.face.face_m;
-    if (over((1 - kHope) * limit))
-        return Verdict::no;
-    return over((1 - kNoDoubt) * limit + skew) || length(range.gradient) < kSmooth
-               ? Verdict::unknown
-               : Verdict::yes;
-}
-
 /// Whether a face keeps the rules. \param clear_m  from its first corner, to other primitives.
-bool Collapser::fits(const Triangle& face, double clear_m, const FaceErrors::Rules& rules) const {
+bool Collapser::fits(const Triangle& face, double clear_m, FaceErrors::Rules& rules) const {
     const FaceErrors::Labels l = {nodes_[face[0]].label, nodes_[face[1]].label,
                                   nodes_[face[2]].label};
     const FaceErrors::Corners p = {positions_[face[0]], positions_[face[1]], positions_[face[2]]};
+    const FaceErrors::Slopes slopes = {slopes_[face[0]], slopes_[face[1]], slopes_[face[2]]};
+    rules.slopes = &slopes;
     constexpr double kBroken = std::numeric_limits<double>::infinity();
+    const auto asked = [&] { return errors_.bound(p, l, rules) < kBroken; };
     const PrimitiveSet shared = errors_.shared(l);
     if (shared.size() != 1 || !rules.exact_corners)
-        return errors_.bound(p, l, rules) < kBroken;
+        return asked();
     const bool alone = clear_m > 0 && std::max(length_squared(p[1] - p[0]),
                                                length_squared(p[2] - p[0])) < clear_m * clear_m;
     const std::uint32_t shape = shared[0];
     const Vec3 n = cross(p[1] - p[0], p[2] - p[0]);
     if (errors_.has_closed_form(shape))
-        return (alone && errors_.fits_ball(shape, p[0], n, rules)) ||
-               errors_.bound(p, l, rules) < kBroken;
-    FaceErrors::Range range;
-    const Verdict verdict = estimate(shape, face, range);
-    if (verdict == Verdict::unknown)
-        return errors_.bound(p, l, rules) < kBroken;
-    if (verdict == Verdict::no ||
-        dot(n, range.gradient) < rules.turn_cosine * length(n) * length(range.gradient))
+        return (alone && errors_.fits_ball(shape, p[0], n, rules)) || asked();
+    if (slopes[0].shape != shape || slopes[1].shape != shape || slopes[2].shape != shape)
+        return asked();
+    // The parabolas at its corners leave no doubt about most faces, and spare their samples.
+    const auto [range, skew, is_smooth] =
+        FaceErrors::parabolas(p, {}, {slopes[0].at(), slopes[1].at(), slopes[2].at()});
+    const double error = rules.centred ? (range.hi - range.lo) / 2 : range.most();
+    if (error > kHope * rules.face_m)
         return false;
-    return alone || errors_.bound_beside(shape, range, p, l, rules) < kBroken;
+    if (!is_smooth || error + skew > kNoDoubt * rules.face_m)
+        return asked();
+    return dot(n, range.gradient) >= rules.turn_cosine * length(n) * length(range.gradient) &&
+           (alone || errors_.bound_beside(shape, range, p, l, rules) < kBroken);
 }
 
 bool Collapser::legal(std::uint32_t b, const Ring& ring) {

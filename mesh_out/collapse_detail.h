@@ -77,15 +77,14 @@ private:
     };
 
     Blocks divide(double block_m, double shift_m);
+    void find_inner();
     void run(std::span<const std::uint32_t> vertices, Buckets& queue);
     void push(std::uint32_t a, std::uint32_t b, Buckets& queue) const;
     bool may_move(const Node& a, const Node& b) const;
     bool try_collapse(std::uint32_t a, std::uint32_t b);
     bool legal(std::uint32_t b, const Ring& ring);
     const Room& room(std::uint32_t v);
-    bool fits(const Triangle& face, double clear_m, const FaceErrors::Rules& rules) const;
-    enum class Verdict { yes, no, unknown };
-    Verdict estimate(std::uint32_t shape, const Triangle& face, FaceErrors::Range& range) const;
+    bool fits(const Triangle& face, double clear_m, FaceErrors::Rules& rules) const;
     bool may_fit(std::uint32_t a, std::uint32_t b) const;
     bool shapely(std::uint32_t a, std::uint32_t b, const Ring& ring) const;
 
@@ -98,20 +97,8 @@ private:
     std::vector<std::uint8_t> inner_; ///< the ring lies in the block of the vertex
     std::vector<std::uint8_t> open_;  ///< not yet tried with its whole ring in one block
     std::vector<Room> rooms_;
-    struct Slope {
-        std::uint32_t shape = FaceErrors::kNone;
-        std::array<float, 3> gradient{};
-        Vec3 at() const { return {gradient[0], gradient[1], gradient[2]}; }
-    };
-    /// The cubic along an edge with the gradients at its ends, where it is 0.
-    struct Bend {
-        double middle = 0, skew = 0; ///< its value half way, and how far it is from a parabola
-    };
-    static Bend bend(const Slope& s, const Slope& t, const Vec3& edge) {
-        const double from = dot(s.at(), edge), to = dot(t.at(), edge);
-        return {(from - to) / 8, (from + to) / 8};
-    }
-    std::vector<Slope> slopes_; ///< of the first primitive without a closed form at a vertex
+    /// Of the first primitive without a closed form at a vertex.
+    std::vector<FaceErrors::Slope> slopes_;
 };
 
 } // namespace taihu

@@ -15,10 +15,11 @@ constexpr double kInfinity = std::numeric_limits<double>::infinity();
 constexpr double kTouch = 0.02; ///< of a spacing: deeper is in, for primitives that only pass by
 constexpr std::size_t kMostSteps = 12; ///< along an edge, of samples
 constexpr int kMostHalvings = 2;
-constexpr double kSmallest = 0.2;     ///< of a spacing: parts of faces are not divided further
-constexpr double kStep = 1.6;         ///< spacings from sample to sample
-constexpr double kFineStep = 0.5;     ///< where a primitive turns out to have creases
-constexpr double kSteep = 0.95;       ///< gradients of distances have length 1
+constexpr double kSmallest = 0.2; ///< of a spacing: parts of faces are not divided further
+constexpr double kStep = 1.6;     ///< spacings from sample to sample
+constexpr double kFineStep = 0.5; ///< where a primitive turns out to have creases
+constexpr double kSteep = 0.95;   ///< gradients of distances have length 1
+constexpr double kSmooth = 2.85;  ///< length of the sum of three gradients of 1 that differ little
 constexpr double kPlanarMargin = 1.1; ///< rims of other surfaces are bent; planes are not
 
 Vec3 middle(const FaceErrors::Corners& f) {
@@ -253,15 +254,58 @@ void FaceErrors::samples(std::uint32_t shape, const Corners& f, std::size_t n, f
         }
 }
 
+FaceErrors::Parabolas FaceErrors::parabolas(const Corners& face, const CornerValues& values,
+                                            const std::array<Vec3, 3>& gradients) {
+    Parabolas out;
+    Range& r = out.range;
+    r = {std::min({values[0], values[1], values[2]}), std::max({values[0], values[1], values[2]}),
+         gradients[0] + gradients[1] + gradients[2]};
+    double middle = (values[0] + values[1] + values[2]) / 3;
+    for (std::size_t k = 0; k < 3; ++k) {
+        const std::size_t next = k == 2 ? 0 : k + 1;
+        const Vec3 edge = face[next] - face[k];
+        const double from = dot(gradients[k], edge), to = dot(gradients[next], edge),
+                     at = (values[k] + values[next]) / 2 + (from - to) / 8;
+        r.lo = std::min(r.lo, at);
+        r.hi = std::max(r.hi, at);
+        middle += (from - to) / 18;
+        out.skew = std::max(out.skew, std::abs(from + to - 2 * (values[next] - values[k])) / 8);
+    }
+    r.lo = std::min(r.lo, middle);
+    r.hi = std::max(r.hi, middle);
+    out.is_smooth = length(r.gradient) > kSmooth;
+    return out;
+}
+
+/// Of a primitive that has corners of the face on it, or comes near.
+FaceErrors::Range FaceErrors::range_beside(std::uint32_t shape, const Corners& face,
+                                           const CornerValues& corners,
+                                           const std::array<Vec3, 3>& gradients,
+                                           const Rules& rules) const {
+    if (rules.slopes && !shapes_[shape].is_ball) {
+        const Parabolas p = parabolas(face, corners, gradients);
+        if (p.is_smooth) // it is not where a gradient is not known: a sum with a 0
+            return {p.range.lo - p.skew, p.range.hi + p.skew, p.range.gradient};
+    }
+    return range(shape, face, &corners);
+}
+
 double FaceErrors::against(std::uint32_t own, const Range& own_range, std::uint32_t other,
                            const Corners& face, const Labels& labels, const Rules& rules) const {
     CornerValues corners{};
+    std::array<Vec3, 3> gradients;
     bool is_labelled = false;
     for (std::size_t k = 0; k < 3; ++k) {
         const bool has = labels[k] != kNone && sets_[labels[k]].has(other);
         is_labelled = is_labelled || has;
-        if (!rules.exact_corners || !has)
-            corners[k] = of(other, face[k]).value_m;
+        if (rules.exact_corners && has) {
+            if (rules.slopes && (*rules.slopes)[k].shape == other)
+                gradients[k] = (*rules.slopes)[k].at();
+            continue;
+        }
+        const FieldProbe::Value at = of(other, face[k]);
+        corners[k] = at.value_m;
+        gradients[k] = at.gradient;
     }
     const double lo = std::min({corners[0], corners[1], corners[2]}),
                  hi = std::max({corners[0], corners[1], corners[2]});
@@ -273,7 +317,7 @@ double FaceErrors::against(std::uint32_t own, const Range& own_range, std::uint3
         return std::abs(n.value_m) > tolerance && n.primitive != shapes_[own].primitive ? kInfinity
                                                                                         : 0;
     }
-    const Range range_there = range(other, face, &corners);
+    const Range range_there = range_beside(other, face, corners, gradients, rules);
     Meeting pair{own, other, -lo >= hi ? 1. : -1., rules};
     if (pierces_nothing && (pair.turn > 0 ? range_there.hi : -range_there.lo) > tolerance)
         return kInfinity;

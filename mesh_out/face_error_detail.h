@@ -17,6 +17,8 @@ class FaceErrors {
 public:
     using Corners = std::array<Vec3, 3>;
     using Labels = std::array<std::uint32_t, 3>; ///< numbers of label sets, one per corner
+    static constexpr std::uint32_t kNone = 0xffffffffu;
+    static constexpr double kFar = 1e300;
 
     /// \param bound_m  the distances asked about are at most twice this.
     /// \param spacing_m  of the mesh that `mesh` comes from: nothing finer is looked for.
@@ -41,15 +43,23 @@ public:
         double least_slope = 1; ///< of the samples
         double most() const { return std::max(-lo, hi); }
     };
+    /// The gradient at a vertex of one of its primitives.
+    struct Slope {
+        std::uint32_t shape = kNone;
+        std::array<float, 3> gradient{};
+        Vec3 at() const { return {gradient[0], gradient[1], gradient[2]}; }
+    };
+    using Slopes = std::array<Slope, 3>;
     /// What one face is judged by.
     struct Rules {
-        double face_m = 0;         ///< distance to its own primitive, at most
-        double rim_m = 0;          ///< distance past rims, at most
-        bool centred = false;      ///< judge as if values were shifted to be centred on 0
-        double turn_cosine = -1;   ///< of the angle to the gradient at the middle, at least
-        bool exact_corners = true; ///< corners lie on all their primitives
-        bool may_pierce = false;   ///< faces may pass through other primitives, within `rim_m`
-        double clear_m = 0;        ///< clearance().sampled of the first corner, or less
+        double face_m = 0;              ///< distance to its own primitive, at most
+        double rim_m = 0;               ///< distance past rims, at most
+        bool centred = false;           ///< judge as if values were shifted to be centred on 0
+        double turn_cosine = -1;        ///< of the angle to the gradient at the middle, at least
+        bool exact_corners = true;      ///< corners lie on all their primitives
+        bool may_pierce = false;        ///< faces may pass through other primitives, within `rim_m`
+        double clear_m = 0;             ///< clearance().sampled of the first corner, or less
+        const Slopes* slopes = nullptr; ///< of exact corners: spare samples of other primitives
     };
     /// How far the primitives at least are that a vertex does not lie on.
     struct Clearance {
@@ -91,6 +101,14 @@ public:
     using CornerValues = std::array<double, 3>;
     Range range(std::uint32_t shape, const Corners& face, const CornerValues* known = nullptr,
                 double give_up_m = kFar) const;
+    /// Of the parabolas along the edges of a face that go by values and gradients at its corners.
+    struct Parabolas {
+        Range range;
+        double skew = 0;        ///< how far the cubics through all of these are from them, at most
+        bool is_smooth = false; ///< gradients are those of a distance, and differ little
+    };
+    static Parabolas parabolas(const Corners& face, const CornerValues& values,
+                               const std::array<Vec3, 3>& gradients);
     /// How many steps along an edge of a face samples of a primitive take.
     std::size_t n_steps(const Corners& face) const;
     /// Values at (n + 1)(n + 2) / 2 points: f1 x + f2 y + f0 (1 - x - y), y from 0 to 1 - x for
@@ -105,8 +123,6 @@ public:
     /// where it is at most `enough_m`; where it is found to be beyond `give_up_m` the search ends.
     double searched(const Corners& face, double enough_m, double give_up_m = kFar) const;
 
-    static constexpr std::uint32_t kNone = 0xffffffffu;
-    static constexpr double kFar = 1e300;
     bool has_closed_form(std::uint32_t shape) const { return shapes_[shape].is_ball; }
 
 private:
@@ -135,6 +151,8 @@ private:
     double past_rim(const Meeting& meeting, const Corners& face, double own, double other) const;
     double meeting(const Meeting& meeting, const Corners& face, const Range& own,
                    const Range& other, int depth) const;
+    Range range_beside(std::uint32_t shape, const Corners& face, const CornerValues& corners,
+                       const std::array<Vec3, 3>& gradients, const Rules& rules) const;
     std::uint32_t shape_of(Primitive primitive) const;
     bool is_sure_of_side(std::uint32_t own, const CornerValues& other, const Corners& face) const;
     double against(std::uint32_t own, const Range& own_range, std::uint32_t other,
