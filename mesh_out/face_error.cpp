@@ -419,11 +419,17 @@ double FaceErrors::searched(const Corners& face, double enough_m, double give_up
             known <= enough_m)
             return known;
     }
-    double far = kInfinity;
-    if (std::hypot(least, radius) <= enough_m || longest_edge(face) < kSmallest * enough_m) {
-        if (const auto y = surface_point_near(field_, m, 4 * pad_))
-            far = radius_about(*y, face);
-        if (far <= enough_m || longest_edge(face) < kSmallest * enough_m)
+    const bool is_small = longest_edge(face) < kSmallest * enough_m;
+    if (std::hypot(least, radius) <= enough_m || is_small) {
+        double far = kInfinity;
+        // Where the way from the middle leads nowhere, those from the corners may.
+        for (const Vec3& from : {m, face[0], face[1], face[2]}) {
+            if (const auto y = surface_point_near(field_, from, 4 * pad_))
+                far = std::min(far, radius_about(*y, face));
+            if (far < kInfinity)
+                break;
+        }
+        if (far <= enough_m || is_small)
             return far;
     }
     double most = 0;
