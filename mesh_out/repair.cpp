@@ -21,8 +21,9 @@ double BoundedSurface::error_of(std::size_t face) const {
 namespace {
 
 constexpr int kRounds = 5;
-constexpr double kShortest = 0.4;  ///< of a spacing: what is split no more
-constexpr double kLeastTurn = 0.2; ///< cosine of how far a split may turn a face
+constexpr double kShortest = 0.4;   ///< of a spacing: what is split no more
+constexpr double kOnSurface = 1e-3; ///< of a spacing
+constexpr double kLeastTurn = 0.2;  ///< cosine of how far a split may turn a face
 
 class Repair {
 public:
@@ -39,6 +40,7 @@ private:
     bool place(std::uint32_t corner, std::size_t face, Vec3& at, std::uint32_t& label) const;
     bool split_is_shapely(std::uint32_t corner, const Vec3& at) const;
     std::uint32_t longest(std::size_t face) const;
+    double error_there(std::size_t face, double enough_m) const;
     std::vector<UnresolvedPlace> places(const std::vector<std::uint8_t>& bad) const;
 
     BoundedSurface& start_;
@@ -128,7 +130,7 @@ bool Repair::place(std::uint32_t corner, std::size_t face, Vec3& at, std::uint32
         return false;
     const auto lies_there = [&](std::uint32_t l, double reach) {
         const auto y = onto(s_.errors.field(), s_.errors.primitives(l), middle, reach);
-        if (!y || std::abs(s_.errors.field().at(*y).value_m) > 1e-3 * s_.spacing_m)
+        if (!y || std::abs(s_.errors.field().at(*y).value_m) > kOnSurface * s_.spacing_m)
             return false;
         at = *y;
         label = l;
@@ -236,6 +238,21 @@ Repaired Repair::run(Progress* progress) {
     return repaired;
 }
 
+/// An upper bound of the distance of a bad face; of its parts none below `enough_m` is told.
+double Repair::error_there(std::size_t face, double enough_m) const {
+    const FaceErrors::Corners corners = s_.corners(face);
+    double error = s_.errors.searched(corners, enough_m);
+    for (const std::uint32_t v : s_.table.triangle(face)) {
+        // At worst the surface is no farther than a vertex that lies on it.
+        const Vec3& y = s_.exact[v];
+        if (error < FaceErrors::kFar ||
+            std::abs(s_.errors.field().at(y).value_m) > kOnSurface * s_.spacing_m)
+            continue;
+        error = std::max({length(corners[0] - y), length(corners[1] - y), length(corners[2] - y)});
+    }
+    return error;
+}
+
 /// Bad faces that hang together are one place.
 std::vector<UnresolvedPlace> Repair::places(const std::vector<std::uint8_t>& bad) const {
     std::vector<UnresolvedPlace> out;
@@ -251,8 +268,7 @@ std::vector<UnresolvedPlace> Repair::places(const std::vector<std::uint8_t>& bad
         while (!open.empty()) {
             const std::size_t f = open.back();
             open.pop_back();
-            const double enough = std::max(error, 1.5 * s_.bound_m);
-            error = std::max(error, s_.errors.searched(s_.corners(f), enough));
+            error = std::max(error, error_there(f, std::max(error, 1.5 * s_.bound_m)));
             for (const std::uint32_t v : s_.table.triangle(f)) {
                 box.include(s_.positions[v]);
                 std::uint32_t c = s_.table.corner(v);
