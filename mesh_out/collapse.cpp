@@ -260,7 +260,7 @@ bool Collapser::try_collapse(std::uint32_t a, std::uint32_t b) {
 /// Whether the cubic through the values and gradients at both ends of an edge leaves hope that its
 /// middle is near enough; spares most of the samples that would say no.
 bool Collapser::may_fit(std::uint32_t a, std::uint32_t b) const {
-    const FaceErrors::Slope &s = slopes_[a], &t = slopes_[b];
+    const FaceSlope &s = slopes_[a], &t = slopes_[b];
     if (s.shape == FaceErrors::kNone || s.shape != t.shape ||
         errors_.n_primitives(nodes_[a].label) > 1 || errors_.n_primitives(nodes_[b].label) > 1)
         return true;
@@ -303,7 +303,7 @@ bool Collapser::fits(const Triangle& face, double clear_m, FaceErrors::Rules& ru
     const FaceErrors::Labels l = {nodes_[face[0]].label, nodes_[face[1]].label,
                                   nodes_[face[2]].label};
     const FaceErrors::Corners p = {positions_[face[0]], positions_[face[1]], positions_[face[2]]};
-    const FaceErrors::Slopes slopes = {slopes_[face[0]], slopes_[face[1]], slopes_[face[2]]};
+    const std::array<FaceSlope, 3> slopes = {slopes_[face[0]], slopes_[face[1]], slopes_[face[2]]};
     rules.slopes = &slopes;
     constexpr double kBroken = std::numeric_limits<double>::infinity();
     const auto asked = [&] { return errors_.bound(p, l, rules) < kBroken; };
@@ -320,7 +320,7 @@ bool Collapser::fits(const Triangle& face, double clear_m, FaceErrors::Rules& ru
         return asked();
     // The parabolas at its corners leave no doubt about most faces, and spare their samples.
     const auto [range, skew, is_smooth] =
-        FaceErrors::parabolas(p, {}, {slopes[0].at(), slopes[1].at(), slopes[2].at()});
+        parabolas(p, {}, {slopes[0].at(), slopes[1].at(), slopes[2].at()});
     const double error = rules.centred ? (range.hi - range.lo) / 2 : range.most();
     if (error > kHope * rules.face_m)
         return false;

@@ -46,7 +46,7 @@ private:
         /// Adds `other`, whose vertex lies at `d` from this one.
         void add(const Quadric& other, const Vec3& d);
     };
-    struct Node { ///< what the queue asks of a vertex
+    struct alignas(64) Node { ///< what the queue asks of a vertex
         Quadric quadric;
         std::uint32_t stamp = 0; ///< of its last change; what the queue has of before is stale
         std::uint32_t label = 0;
@@ -98,7 +98,7 @@ private:
     std::vector<std::uint8_t> open_;  ///< not yet tried with its whole ring in one block
     std::vector<Room> rooms_;
     /// Of the first primitive without a closed form at a vertex.
-    std::vector<FaceErrors::Slope> slopes_;
+    std::vector<FaceSlope> slopes_;
 };
 
 } // namespace taihu

@@ -139,8 +139,23 @@ FaceErrors::Clearance FaceErrors::clearance(const Vec3& p, std::uint32_t label) 
     return least;
 }
 
+bool FaceErrors::fits_ball(std::uint32_t shape, const Vec3& corner, const Vec3& normal,
+                           const Rules& rules) const {
+    // No point of the face is nearer to the centre than its plane, and none farther than a corner.
+    const Shape& s = shapes_[shape];
+    const double area = length(normal), h = s.sign * dot(normal, corner - s.center),
+                 r = s.radius * area;
+    return r - h <= (rules.centred ? 2 : 1) * rules.face_m * area && h >= rules.turn_cosine * r;
+}
+
 double FaceErrors::reach_m(const Rules& rules) const {
     return rules.face_m + kTouch * spacing_;
+}
+
+PrimitiveSet FaceErrors::shared(const Labels& labels) const {
+    if (labels[0] == labels[1] && labels[1] == labels[2])
+        return sets_[labels[0]];
+    return sets_[labels[0]].common(sets_[labels[1]]).common(sets_[labels[2]]);
 }
 
 std::uint32_t FaceErrors::own(const Corners& face, const Labels& labels, bool exact_corners,
@@ -254,36 +269,13 @@ void FaceErrors::samples(std::uint32_t shape, const Corners& f, std::size_t n, f
         }
 }
 
-FaceErrors::Parabolas FaceErrors::parabolas(const Corners& face, const CornerValues& values,
-                                            const std::array<Vec3, 3>& gradients) {
-    Parabolas out;
-    Range& r = out.range;
-    r = {std::min({values[0], values[1], values[2]}), std::max({values[0], values[1], values[2]}),
-         gradients[0] + gradients[1] + gradients[2]};
-    double middle = (values[0] + values[1] + values[2]) / 3;
-    for (std::size_t k = 0; k < 3; ++k) {
-        const std::size_t next = k == 2 ? 0 : k + 1;
-        const Vec3 edge = face[next] - face[k];
-        const double from = dot(gradients[k], edge), to = dot(gradients[next], edge),
-                     at = (values[k] + values[next]) / 2 + (from - to) / 8;
-        r.lo = std::min(r.lo, at);
-        r.hi = std::max(r.hi, at);
-        middle += (from - to) / 18;
-        out.skew = std::max(out.skew, std::abs(from + to - 2 * (values[next] - values[k])) / 8);
-    }
-    r.lo = std::min(r.lo, middle);
-    r.hi = std::max(r.hi, middle);
-    out.is_smooth = length(r.gradient) > kSmooth;
-    return out;
-}
-
 /// Of a primitive that has corners of the face on it, or comes near.
 FaceErrors::Range FaceErrors::range_beside(std::uint32_t shape, const Corners& face,
                                            const CornerValues& corners,
                                            const std::array<Vec3, 3>& gradients,
                                            const Rules& rules) const {
     if (rules.slopes && !shapes_[shape].is_ball) {
-        const Parabolas p = parabolas(face, corners, gradients);
+        const FaceParabolas p = parabolas(face, corners, gradients);
         if (p.is_smooth) // it is not where a gradient is not known: a sum with a 0
             return {p.range.lo - p.skew, p.range.hi + p.skew, p.range.gradient};
     }

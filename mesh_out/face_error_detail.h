@@ -6,6 +6,7 @@
 #include <span>
 #include <vector>
 
+#include "mesh_out/face_rules_detail.h"
 #include "mesh_out/labelled_mesh.h"
 
 namespace taihu {
@@ -15,9 +16,12 @@ namespace taihu {
 /// numbers. Thread-safe.
 class FaceErrors {
 public:
-    using Corners = std::array<Vec3, 3>;
+    using Corners = FaceCorners;
+    using CornerValues = FaceValues;
     using Labels = std::array<std::uint32_t, 3>; ///< numbers of label sets, one per corner
-    static constexpr std::uint32_t kNone = 0xffffffffu;
+    using Range = FaceRange;
+    using Rules = FaceRules;
+    static constexpr std::uint32_t kNone = FaceSlope::kNone;
     static constexpr double kFar = 1e300;
 
     /// \param bound_m  the distances asked about are at most twice this.
@@ -36,31 +40,6 @@ public:
     std::uint32_t label_of(const PrimitiveSet& shapes);
     const FieldProbe& field() const { return field_; }
 
-    /// The range of values of a primitive over a face [m].
-    struct Range {
-        double lo = 0, hi = 0;
-        Vec3 gradient;          ///< summed over samples; 0 for balls
-        double least_slope = 1; ///< of the samples
-        double most() const { return std::max(-lo, hi); }
-    };
-    /// The gradient at a vertex of one of its primitives.
-    struct Slope {
-        std::uint32_t shape = kNone;
-        std::array<float, 3> gradient{};
-        Vec3 at() const { return {gradient[0], gradient[1], gradient[2]}; }
-    };
-    using Slopes = std::array<Slope, 3>;
-    /// What one face is judged by.
-    struct Rules {
-        double face_m = 0;              ///< distance to its own primitive, at most
-        double rim_m = 0;               ///< distance past rims, at most
-        bool centred = false;           ///< judge as if values were shifted to be centred on 0
-        double turn_cosine = -1;        ///< of the angle to the gradient at the middle, at least
-        bool exact_corners = true;      ///< corners lie on all their primitives
-        bool may_pierce = false;        ///< faces may pass through other primitives, within `rim_m`
-        double clear_m = 0;             ///< clearance().sampled of the first corner, or less
-        const Slopes* slopes = nullptr; ///< of exact corners: spare samples of other primitives
-    };
     /// How far the primitives at least are that a vertex does not lie on.
     struct Clearance {
         double sampled = 0; ///< those without a closed form
@@ -68,15 +47,9 @@ public:
     };
     Clearance clearance(const Vec3& p, std::uint32_t label) const;
     /// Whether a face with its corners on one ball, and nothing else near, surely keeps `rules`:
-    /// told by its plane, which is nearer to the centre than the face. \param normal  of any
-    /// length.
+    /// told by its plane. \param normal  of any length.
     bool fits_ball(std::uint32_t shape, const Vec3& corner, const Vec3& normal,
-                   const Rules& rules) const {
-        const Shape& s = shapes_[shape];
-        const double area = length(normal), h = s.sign * dot(normal, corner - s.center),
-                     r = s.radius * area;
-        return r - h <= (rules.centred ? 2 : 1) * rules.face_m * area && h >= rules.turn_cosine * r;
-    }
+                   const Rules& rules) const;
     /// How far a face may be from its primitive to keep `rules`, and still touch nothing else.
     double reach_m(const Rules& rules) const;
     /// An upper bound of the distance from the points of a face to the surface of the solid, as far
@@ -89,26 +62,12 @@ public:
                         const Labels& labels, const Rules& rules) const;
 
     /// The shapes that all three corners lie on.
-    PrimitiveSet shared(const Labels& labels) const {
-        if (labels[0] == labels[1] && labels[1] == labels[2])
-            return sets_[labels[0]];
-        return sets_[labels[0]].common(sets_[labels[1]]).common(sets_[labels[2]]);
-    }
-    /// Of these the nearest to the face; kNone where there is none.
-    /// Values beyond `give_up_m` may end the search for the range.
+    PrimitiveSet shared(const Labels& labels) const;
+    /// Of these the nearest to the face, or kNone. Values beyond `give_up_m` may end the search.
     std::uint32_t own(const Corners& face, const Labels& labels, bool exact_corners, Range& range,
                       double give_up_m = kFar) const;
-    using CornerValues = std::array<double, 3>;
     Range range(std::uint32_t shape, const Corners& face, const CornerValues* known = nullptr,
                 double give_up_m = kFar) const;
-    /// Of the parabolas along the edges of a face that go by values and gradients at its corners.
-    struct Parabolas {
-        Range range;
-        double skew = 0;        ///< how far the cubics through all of these are from them, at most
-        bool is_smooth = false; ///< gradients are those of a distance, and differ little
-    };
-    static Parabolas parabolas(const Corners& face, const CornerValues& values,
-                               const std::array<Vec3, 3>& gradients);
     /// How many steps along an edge of a face samples of a primitive take.
     std::size_t n_steps(const Corners& face) const;
     /// Values at (n + 1)(n + 2) / 2 points: f1 x + f2 y + f0 (1 - x - y), y from 0 to 1 - x for
@@ -118,11 +77,10 @@ public:
     const PrimitiveSet& set(std::uint32_t label) const { return sets_[label]; }
     std::span<const std::uint32_t> shapes(std::uint32_t label) const { return sets_[label].all(); }
 
-    /// An upper bound of the distances of all points of a face by surface points found near it;
-    /// or the closed forms of its parts; slow, and right whatever the labels. Parts are not divided
+    /// An upper bound of the distances of all points of a face, by the closed forms of its parts or
+    /// surface points found near them; slow, and right whatever the labels. Parts are not divided
     /// where it is at most `enough_m`; where it is found to be beyond `give_up_m` the search ends.
     double searched(const Corners& face, double enough_m, double give_up_m = kFar) const;
-
     bool has_closed_form(std::uint32_t shape) const { return shapes_[shape].is_ball; }
 
 private:
@@ -165,10 +123,7 @@ private:
     }
     /// From the centre of a cell: what is nearer is in its list.
     double list_reach() const { return kHalfDiagonal * cell_ + pad_; }
-    std::size_t cell_of(const std::array<int, 3>& c) const {
-        return (static_cast<std::size_t>(c[0]) * n_[1] + static_cast<std::size_t>(c[1])) * n_[2] +
-               static_cast<std::size_t>(c[2]);
-    }
+    std::size_t cell_of(const std::array<int, 3>& c) const;
     int coordinate(double x, int axis) const;
     Vec3 center_of(const std::array<int, 3>& c) const {
         return origin_ + Vec3{c[0] + .5, c[1] + .5, c[2] + .5} * cell_;

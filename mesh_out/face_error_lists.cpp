@@ -51,6 +51,11 @@ int FaceErrors::coordinate(double x, int axis) const {
                       static_cast<int>(n_[static_cast<std::size_t>(axis)]) - 1);
 }
 
+std::size_t FaceErrors::cell_of(const std::array<int, 3>& c) const {
+    return (static_cast<std::size_t>(c[0]) * n_[1] + static_cast<std::size_t>(c[1])) * n_[2] +
+           static_cast<std::size_t>(c[2]);
+}
+
 void FaceErrors::find_near(const LabelledMesh& mesh, std::vector<std::vector<Primitive>>& near) {
     cells_.assign(n_[0] * n_[1] * n_[2], kNone);
     for (const Vec3& p : mesh.positions) {
