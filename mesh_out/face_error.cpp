@@ -426,7 +426,7 @@ double FaceErrors::searched(const Corners& face, double enough_m, double give_up
     }
     double most = 0;
     for (const Corners& part : quarters(face)) {
-        most = std::max(most, searched(part, enough_m, give_up_m));
+        most = std::max(most, searched(part, std::max(enough_m, most), give_up_m));
         if (most > give_up_m)
             return most;
     }
