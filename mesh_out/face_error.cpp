@@ -369,7 +369,7 @@ double FaceErrors::past_rim(const Meeting& pair, const Corners& face, double own
                    h = normalized(of(pair.other, m).gradient);
         const double cosine = dot(g, h);
         if (other <= 0 && other <= own * cosine)
-            return own;
+            return 0; // not past it: straight above its own surface
         return kPlanarMargin * past_wedge(own, other, cosine);
     }
     // In the half plane through the axis of both balls the rim is the point where two circles meet;
@@ -387,7 +387,7 @@ double FaceErrors::past_rim(const Meeting& pair, const Corners& face, double own
                           (s.radius * s.radius + t.radius * t.radius - apart * apart) /
                           (2 * s.radius * t.radius);
     if (other <= 0 && other <= own * cosine)
-        return own;
+        return 0;
     if (own < other * cosine || other < own * cosine)
         return std::max(own, other);
     if (!meet(s.radius + pair.turn * s.sign * own, t.radius + pair.turn * t.sign * other, z_deep,
