@@ -129,16 +129,18 @@ BoundedMesh BoundedSimplifier::level(double bound_m, Surface& collapsed, Progres
             balance(surface);
         // Balancing and splitting may make faces cross: not there, then. If that does not help,
         // the input stays round them; it does not cross itself.
+        const bool can_freeze = freeze < kMostFreezes;
         for (int trial = 0;; ++trial) {
-            Repaired repaired = repair(surface, progress);
-            if (repaired.crossings.empty() || (freeze == kMostFreezes && trial == kMostTries))
+            Repaired repaired = repair(surface, !can_freeze && trial == kMostTries, progress);
+            if (repaired.crossings.empty() || (!can_freeze && trial == kMostTries))
                 return std::move(repaired.result);
             crossings.insert(crossings.end(), repaired.crossings.begin(), repaired.crossings.end());
-            if (trial == kMostTries)
+            const bool is_new =
+                keep(surface, near(mesh.positions, repaired.crossings, settings_.spacing_m));
+            if (can_freeze && (trial == kMostTries || !is_new))
                 break;
-            keep(surface, near(mesh.positions, repaired.crossings, settings_.spacing_m));
         }
-        frozen = near(from.positions, crossings, (1 << freeze) * 2 * settings_.spacing_m);
+        frozen = near(from.positions, crossings, (1 << freeze) * settings_.spacing_m);
     }
 }
 

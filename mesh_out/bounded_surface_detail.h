@@ -36,8 +36,8 @@ struct BoundedSurface {
 /// them are centred on 0, and back where that would break the bound.
 void balance(BoundedSurface& surface);
 
-/// More vertices that stay, where they are exact.
-void keep(BoundedSurface& surface, const std::vector<std::uint8_t>& more);
+/// More vertices that stay, where they are exact; false when they all did already.
+bool keep(BoundedSurface& surface, const std::vector<std::uint8_t>& more);
 
 /// Makes the bound hold and crossings vanish: moved vertices go back, faces are split by new
 /// vertices on the solid's surface. What neither mends is named. The surface itself stays and
@@ -46,6 +46,7 @@ struct Repaired {
     BoundedMesh result;
     std::vector<Sphere> crossings; ///< round faces that still meet others
 };
-Repaired repair(BoundedSurface& surface, Progress* progress);
+/// \param is_last  without it there is no result where faces still meet.
+Repaired repair(BoundedSurface& surface, bool is_last, Progress* progress);
 
 } // namespace taihu

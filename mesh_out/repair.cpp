@@ -30,7 +30,7 @@ public:
     explicit Repair(BoundedSurface& surface)
         : start_(surface), s_(surface), errors_(surface.face_errors), dirty_(surface.dirty),
           n_old_(surface.positions.size()) {}
-    Repaired run(Progress* progress);
+    Repaired run(bool is_last, Progress* progress);
 
 private:
     void measure();
@@ -194,7 +194,7 @@ bool Repair::split(std::size_t face) {
     return false;
 }
 
-Repaired Repair::run(Progress* progress) {
+Repaired Repair::run(bool is_last, Progress* progress) {
     Repaired repaired;
     BoundedMesh& out = repaired.result;
     out.bound_m = s_.bound_m;
@@ -220,16 +220,20 @@ Repaired Repair::run(Progress* progress) {
             break;
     }
     for (std::size_t f = 0; f < errors_.size(); ++f) {
+        if (!meets[f])
+            continue;
+        const FaceErrors::Corners p = s_.corners(f);
+        const Vec3 middle = (p[0] + p[1] + p[2]) / 3;
+        repaired.crossings.push_back(
+            {middle,
+             std::max({length(p[0] - middle), length(p[1] - middle), length(p[2] - middle)})});
+    }
+    if (!is_last && !repaired.crossings.empty())
+        return repaired;
+    for (std::size_t f = 0; f < errors_.size(); ++f) {
         out.mesh.triangles.push_back(s_.table.triangle(f));
         if (!bad[f])
             out.error_m = std::max(out.error_m, errors_[f]);
-        if (meets[f]) {
-            const FaceErrors::Corners p = s_.corners(f);
-            const Vec3 middle = (p[0] + p[1] + p[2]) / 3;
-            repaired.crossings.push_back(
-                {middle,
-                 std::max({length(p[0] - middle), length(p[1] - middle), length(p[2] - middle)})});
-        }
     }
     out.unresolved = places(bad);
     out.mesh.positions = s_.positions;
@@ -288,10 +292,12 @@ std::vector<UnresolvedPlace> Repair::places(const std::vector<std::uint8_t>& bad
 
 } // namespace
 
-void keep(BoundedSurface& s, const std::vector<std::uint8_t>& more) {
+bool keep(BoundedSurface& s, const std::vector<std::uint8_t>& more) {
+    bool any = false;
     for (std::uint32_t v = 0; v < more.size(); ++v) {
         if (!more[v] || s.kept[v])
             continue;
+        any = true;
         s.kept[v] = 1;
         s.positions[v] = s.exact[v];
         std::uint32_t c = s.table.corner(v);
@@ -300,10 +306,11 @@ void keep(BoundedSurface& s, const std::vector<std::uint8_t>& more) {
             c = s.table.swing(c);
         } while (c != s.table.corner(v));
     }
+    return any;
 }
 
-Repaired repair(BoundedSurface& surface, Progress* progress) {
-    return Repair(surface).run(progress);
+Repaired repair(BoundedSurface& surface, bool is_last, Progress* progress) {
+    return Repair(surface).run(is_last, progress);
 }
 
 } // namespace taihu
