@@ -299,7 +299,7 @@ const Collapser::Room& Collapser::room(std::uint32_t v) {
 }
 
 /// Whether a face keeps the rules. \param clear_m  from its first corner, to other primitives.
-bool Collapser::fits(const Triangle& face, double clear_m, FaceErrors::Rules& rules) const {
+bool Collapser::fits(const Triangle& face, double clear_m, FaceErrors::Rules rules) const {
     const FaceErrors::Labels l = {nodes_[face[0]].label, nodes_[face[1]].label,
                                   nodes_[face[2]].label};
     const FaceErrors::Corners p = {positions_[face[0]], positions_[face[1]], positions_[face[2]]};

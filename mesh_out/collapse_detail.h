@@ -84,7 +84,7 @@ private:
     bool try_collapse(std::uint32_t a, std::uint32_t b);
     bool legal(std::uint32_t b, const Ring& ring);
     const Room& room(std::uint32_t v);
-    bool fits(const Triangle& face, double clear_m, FaceErrors::Rules& rules) const;
+    bool fits(const Triangle& face, double clear_m, FaceErrors::Rules rules) const;
     bool may_fit(std::uint32_t a, std::uint32_t b) const;
     bool shapely(std::uint32_t a, std::uint32_t b, const Ring& ring) const;
 

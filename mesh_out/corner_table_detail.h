@@ -17,8 +17,8 @@ public:
     static constexpr std::uint32_t kNone = 0xffffffffu;
     static constexpr std::size_t kMostCorners = 40; ///< round a vertex, that are worked on
 
-    /// The corners round a vertex, counter-clockwise, and the vertices after each, which are those
-    /// before the one that precedes it.
+    /// The corners round a vertex, counter-clockwise; in its triangle corner k comes before
+    /// neighbour k and after neighbour k + 1.
     struct Ring {
         std::size_t n = 0;
         std::array<std::uint32_t, kMostCorners> corners, neighbours;
