@@ -10,7 +10,7 @@
 namespace taihu {
 namespace {
 
-constexpr int kSweeps = 8;
+constexpr int kSweeps = 6;
 constexpr double kStep = 0.8;        ///< of the way, or neighbours overshoot together
 constexpr double kFaceShare = 0.9;   ///< of the bound, that a vertex on a face may move
 constexpr double kRimShare = 0.5;    ///< and one on a rim, off each of its faces
