@@ -41,20 +41,27 @@ std::vector<std::uint8_t> near(const std::vector<Vec3>& points, const std::vecto
     return out;
 }
 
+/// Fewer vertices of a surface, with the numbers of their label sets.
+struct Collapsed {
+    LabelledMesh mesh;
+    std::vector<std::uint32_t> labels;
+};
+
 /// What the table still has, renumbered.
-LabelledMesh compact(const CornerTable& table, const LabelledMesh& from) {
-    LabelledMesh out;
+Collapsed compact(const CornerTable& table, const LabelledMesh& from, const FaceErrors& errors) {
+    Collapsed out;
     std::vector<std::uint32_t> renamed(from.positions.size(), CornerTable::kNone);
     for (std::uint32_t v = 0; v < renamed.size(); ++v)
         if (table.has_vertex(v)) {
-            renamed[v] = static_cast<std::uint32_t>(out.positions.size());
-            out.positions.push_back(from.positions[v]);
-            out.labels.push_back(from.labels[v]);
+            renamed[v] = static_cast<std::uint32_t>(out.labels.size());
+            out.mesh.positions.push_back(from.positions[v]);
+            out.mesh.labels.push_back(from.labels[v]);
+            out.labels.push_back(errors.labels()[v]);
         }
     for (std::size_t t = 0; t < table.n_triangles(); ++t)
         if (table.has_triangle(t)) {
             const Triangle v = table.triangle(t);
-            out.triangles.push_back({renamed[v[0]], renamed[v[1]], renamed[v[2]]});
+            out.mesh.triangles.push_back({renamed[v[0]], renamed[v[1]], renamed[v[2]]});
         }
     return out;
 }
@@ -63,68 +70,78 @@ LabelledMesh compact(const CornerTable& table, const LabelledMesh& from) {
 
 BoundedSimplifier::BoundedSimplifier(LabelledMesh mesh, const FieldProbe& field,
                                      const BoundedSettings& settings)
-    : mesh_(std::move(mesh)), field_(field), settings_(settings) {
+    : surface_{std::move(mesh), {}}, field_(field), settings_(settings) {
     require(settings.spacing_m > 0 && std::isfinite(settings.spacing_m),
             "spacing_m is " + rounded(settings.spacing_m) + ", must be finite and > 0");
     require(settings.max_turn_deg > 0 && settings.max_turn_deg <= 90,
             "max_turn_deg is " + rounded(settings.max_turn_deg) + ", must be in (0, 90]");
-    require(mesh_.labels.size() == mesh_.positions.size(),
-            std::to_string(mesh_.labels.size()) + " labels for " +
-                std::to_string(mesh_.positions.size()) + " positions; give one each");
-    for (std::size_t v = 0; v < mesh_.positions.size(); ++v)
-        if (!is_finite(mesh_.positions[v]))
+    const LabelledMesh& m = surface_.mesh;
+    require(m.labels.size() == m.positions.size(),
+            std::to_string(m.labels.size()) + " labels for " + std::to_string(m.positions.size()) +
+                " positions; give one each");
+    for (std::size_t v = 0; v < m.positions.size(); ++v)
+        if (!is_finite(m.positions[v]))
             require(false, "the position of vertex " + std::to_string(v) +
                                " is not finite; extract the mesh again");
-    const CornerTable checked(mesh_.positions.size(), mesh_.triangles, kWhere);
+    surface_.table = std::make_shared<CornerTable>(m.positions.size(), m.triangles, kWhere);
 }
 
-LabelledMesh BoundedSimplifier::collapse(double bound_m, std::span<const std::uint8_t> frozen,
-                                         Progress* progress) const {
-    const FaceErrors errors(mesh_, field_, bound_m, settings_.spacing_m);
-    CornerTable table(mesh_.positions.size(), mesh_.triangles, kWhere);
+BoundedMesh BoundedSimplifier::level(double bound_m, std::span<const Sphere> kept,
+                                     Surface& collapsed, Progress* progress) const {
+    report_stage(progress, "simplify");
+    const LabelledMesh& from = surface_.mesh;
+    FaceErrors errors(from, field_, bound_m, settings_.spacing_m);
     Collapser::Rules rules;
     rules.face.face_m = (settings_.balance ? kCentredShare : 1) * bound_m;
     rules.face.rim_m = bound_m;
     rules.face.centred = settings_.balance;
     rules.face.turn_cosine = std::cos(settings_.max_turn_deg * std::numbers::pi / 180);
     rules.off_m = 0.1 * bound_m;
-    Collapser collapser(table, mesh_.positions, frozen, errors, rules);
-    const double block = kBlockEdges * collapser.mean_edge_m();
-    for (int i = 0; i < kPasses; ++i)
-        collapser.pass(block, i * kShift * block, progress);
-    return compact(table, mesh_);
-}
-
-BoundedMesh BoundedSimplifier::level(double bound_m, std::span<const Sphere> kept,
-                                     LabelledMesh& collapsed, Progress* progress) const {
     std::vector<Sphere> crossings(kept.begin(), kept.end());
-    std::vector<std::uint8_t> frozen = near(mesh_.positions, crossings, 0);
-    // Balancing and splitting may make faces cross: not there, then. If that does not help, the
-    // input stays round them; it does not cross itself.
-    for (int trial = 0;; ++trial) {
-        if (trial == 0 || trial > kMostTries) {
+    std::vector<std::uint8_t> frozen = near(from.positions, crossings, 0);
+    for (int freeze = 0;; ++freeze) {
+        if (freeze > 0)
             report_stage(progress, "simplify");
-            collapsed = collapse(bound_m, frozen, progress);
-            report_stage(progress, "check the bound");
+        Collapsed fewer;
+        {
+            CornerTable table = *surface_.table;
+            Collapser collapser(table, from.positions, frozen, errors, rules);
+            const double block = kBlockEdges * collapser.mean_edge_m();
+            for (int i = 0; i < kPasses; ++i)
+                collapser.pass(block, i * kShift * block, progress);
+            fewer = compact(table, from, errors);
         }
-        FaceErrors errors(collapsed, field_, bound_m, settings_.spacing_m);
-        BoundedSurface surface{CornerTable(collapsed.positions.size(), collapsed.triangles, kWhere),
-                               collapsed.positions,
-                               collapsed.positions,
-                               errors.labels(),
+        collapsed.mesh = std::move(fewer.mesh);
+        const LabelledMesh& mesh = collapsed.mesh;
+        collapsed.table =
+            std::make_shared<CornerTable>(mesh.positions.size(), mesh.triangles, kWhere);
+        report_stage(progress, "check the bound");
+        BoundedSurface surface{*collapsed.table,
+                               mesh.positions,
+                               mesh.positions,
+                               std::move(fewer.labels),
                                errors,
                                bound_m,
                                settings_.spacing_m,
-                               near(collapsed.positions, crossings, settings_.spacing_m)};
+                               near(mesh.positions, crossings, settings_.spacing_m),
+                               {},
+                               {}};
         if (settings_.balance)
             balance(surface);
-        Repaired repaired = repair(surface, progress);
-        if (repaired.crossings.empty() || trial == kMostTries + kMostFreezes)
-            return std::move(repaired.result);
-        crossings.insert(crossings.end(), repaired.crossings.begin(), repaired.crossings.end());
-        if (trial >= kMostTries)
-            frozen =
-                near(mesh_.positions, crossings, (1 << (trial - kMostTries)) * settings_.spacing_m);
+        // Balancing and splitting may make faces cross: not there, then. If that does not help,
+        // the input stays round them; it does not cross itself.
+        const bool can_freeze = freeze < kMostFreezes;
+        for (int trial = 0;; ++trial) {
+            Repaired repaired = repair(surface, !can_freeze && trial == kMostTries, progress);
+            if (repaired.crossings.empty() || (!can_freeze && trial == kMostTries))
+                return std::move(repaired.result);
+            crossings.insert(crossings.end(), repaired.crossings.begin(), repaired.crossings.end());
+            const bool is_new =
+                keep(surface, near(mesh.positions, repaired.crossings, settings_.spacing_m));
+            if (can_freeze && (trial == kMostTries || !is_new))
+                break;
+        }
+        frozen = near(from.positions, crossings, (1 << freeze) * settings_.spacing_m);
     }
 }
 
@@ -133,16 +150,16 @@ BoundedMesh BoundedSimplifier::within(double bound_m, std::span<const Sphere> ke
     require(bound_m > 0 && std::isfinite(bound_m) && bound_m >= bound_m_,
             "bound_m is " + rounded(bound_m) + ", must be finite, > 0 and not below " +
                 rounded(bound_m_) + " of the level before");
-    LabelledMesh collapsed;
+    Surface collapsed;
     BoundedMesh out = level(bound_m, kept, collapsed, progress);
-    mesh_ = std::move(collapsed);
+    surface_ = std::move(collapsed);
     bound_m_ = bound_m;
     return out;
 }
 
 BoundedMesh BoundedSimplifier::to_triangles(std::size_t n, Progress* progress) {
-    require(n >= 4 && n <= mesh_.triangles.size(),
-            std::to_string(n) + " triangles of " + std::to_string(mesh_.triangles.size()) +
+    require(n >= 4 && n <= surface_.mesh.triangles.size(),
+            std::to_string(n) + " triangles of " + std::to_string(surface_.mesh.triangles.size()) +
                 "; must be at least 4 and no more than there are");
     // Counts fall about as the bound to the power -2/3, and never rise by much: start there, then
     // keep a bracket. Too coarse a trial is thrown away; one too fine is what the next starts from.
@@ -152,18 +169,18 @@ BoundedMesh BoundedSimplifier::to_triangles(std::size_t n, Progress* progress) {
     double fine = bound_m_, coarse = 0;
     double bound = fine > 0 ? fine : kFirstBound * settings_.spacing_m;
     Box box;
-    for (const Vec3& p : mesh_.positions)
+    for (const Vec3& p : surface_.mesh.positions)
         box.include(p);
     for (int trial = 0; trial < kMostTrials && bound < box.longest(); ++trial) {
-        LabelledMesh collapsed;
+        Surface collapsed;
         BoundedMesh out = level(bound, {}, collapsed, progress);
         const std::size_t count = out.mesh.triangles.size();
         if (count > n) {
             fine = bound;
-            mesh_ = std::move(collapsed);
+            surface_ = std::move(collapsed);
             bound_m_ = bound;
         } else if (fits(count)) {
-            mesh_ = std::move(collapsed);
+            surface_ = std::move(collapsed);
             bound_m_ = bound;
             return out;
         } else {
@@ -181,7 +198,7 @@ BoundedMesh BoundedSimplifier::to_triangles(std::size_t n, Progress* progress) {
     throw Error(Fault::numeric,
                 std::string(kWhere) + ": " + std::to_string(n) +
                     " triangles are too few for its rims and tunnels, there is nothing between " +
-                    std::to_string(mesh_.triangles.size()) + " and that; ask for more");
+                    std::to_string(surface_.mesh.triangles.size()) + " and that; ask for more");
 }
 
 } // namespace taihu

@@ -1,7 +1,7 @@
 #pragma once
 #include <cstddef>
 #include <cstdint>
-#include <span>
+#include <memory>
 #include <vector>
 
 #include "mesh_out/labelled_mesh.h"
@@ -9,6 +9,8 @@
 #include "vdb_ops/field_probe.h"
 
 namespace taihu {
+
+class CornerTable;
 
 struct BoundedSettings {
     double spacing_m = 0;     ///< of the lattice that the mesh was made on [m], > 0
@@ -60,16 +62,20 @@ public:
     BoundedMesh to_triangles(std::size_t n, Progress* progress = nullptr);
 
     /// On the surface, of the last level, or as it came.
-    const LabelledMesh& surface() const { return mesh_; }
+    const LabelledMesh& surface() const { return surface_.mesh; }
 
 private:
-    LabelledMesh collapse(double bound_m, std::span<const std::uint8_t> frozen,
-                          Progress* progress) const;
+    /// A mesh of exact vertices with its corner table.
+    struct Surface {
+        LabelledMesh mesh;
+        std::shared_ptr<const CornerTable> table;
+    };
+
     /// \param collapsed  becomes the surface before it is balanced and mended.
-    BoundedMesh level(double bound_m, std::span<const Sphere> kept, LabelledMesh& collapsed,
+    BoundedMesh level(double bound_m, std::span<const Sphere> kept, Surface& collapsed,
                       Progress* progress) const;
 
-    LabelledMesh mesh_; ///< on the surface, of the last level
+    Surface surface_; ///< of the last level
     const FieldProbe& field_;
     BoundedSettings settings_;
     double bound_m_ = 0; ///< of the last level

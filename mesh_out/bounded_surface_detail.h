@@ -16,7 +16,9 @@ struct BoundedSurface {
     std::vector<std::uint32_t> labels;
     FaceErrors& errors;
     double bound_m = 0, spacing_m = 0;
-    std::vector<std::uint8_t> kept; ///< per vertex of the start: not moved, its faces not split
+    std::vector<std::uint8_t> kept;  ///< per vertex of the start: not moved, its faces not split
+    std::vector<double> face_errors; ///< as far as repair() went by them; empty before
+    std::vector<std::uint8_t> dirty; ///< faces that it looks at first; empty for all
 
     FaceErrors::Corners corners(std::size_t face) const {
         const Triangle t = table.triangle(face);
@@ -34,12 +36,17 @@ struct BoundedSurface {
 /// them are centred on 0, and back where that would break the bound.
 void balance(BoundedSurface& surface);
 
+/// More vertices that stay, where they are exact; false when they all did already.
+bool keep(BoundedSurface& surface, const std::vector<std::uint8_t>& more);
+
 /// Makes the bound hold and crossings vanish: moved vertices go back, faces are split by new
-/// vertices on the solid's surface. What neither mends is named.
+/// vertices on the solid's surface. What neither mends is named. The surface itself stays and
+/// learns what its faces are like, so that after keep() only few are looked at again.
 struct Repaired {
     BoundedMesh result;
     std::vector<Sphere> crossings; ///< round faces that still meet others
 };
-Repaired repair(BoundedSurface& surface, Progress* progress);
+/// \param is_last  without it there is no result where faces still meet.
+Repaired repair(BoundedSurface& surface, bool is_last, Progress* progress);
 
 } // namespace taihu

@@ -17,17 +17,11 @@ constexpr std::uint32_t kNone = CornerTable::kNone;
 constexpr std::size_t kMostValence = 24;
 constexpr float kLengthWeight = 1e-3f; ///< on what is flat, short edges go first
 constexpr float kAtOnce = 1e-20f, kNever = 1e30f;
-constexpr double kHope = 1.25; ///< how far over its estimate an error may still turn out to fit
+constexpr double kHope = 1.25;   ///< how far over its estimate an error may still turn out to fit
+constexpr double kNoDoubt = 0.8; ///< how far below the bound an estimate is taken for the error
 constexpr double kMostBlocks = 1 << 22;
 
 } // namespace
-
-float Collapser::Quadric::at(const Vec3& d) const {
-    const auto x = static_cast<float>(d.x), y = static_cast<float>(d.y),
-               z = static_cast<float>(d.z);
-    return x * (a[0] * x + 2 * (a[1] * y + a[2] * z + b[0])) +
-           y * (a[3] * y + 2 * (a[4] * z + b[1])) + z * (a[5] * z + 2 * b[2]) + c;
-}
 
 void Collapser::Quadric::add(const Quadric& other, const Vec3& d) {
     // q(x) about other is q(x + s) about this, s = this - other.
@@ -61,17 +55,17 @@ Collapser::Entry Collapser::Buckets::pop() {
 Collapser::Collapser(CornerTable& table, std::span<const Vec3> positions,
                      std::span<const std::uint8_t> frozen, const FaceErrors& errors,
                      const Rules& rules)
-    : table_(table), positions_(positions), frozen_(frozen), errors_(errors), rules_(rules),
-      quadrics_(positions.size()), stamps_(positions.size(), 0), owners_(positions.size(), 0),
-      inner_(positions.size(), 0), open_(positions.size(), 1), off_(positions.size(), 0),
-      clear_m_(positions.size(), 0), slopes_(positions.size()) {
+    : table_(table), positions_(positions), errors_(errors), rules_(rules),
+      nodes_(positions.size()), owners_(positions.size(), 0), inner_(positions.size(), 0),
+      open_(positions.size(), 1), rooms_(positions.size()), slopes_(positions.size()) {
     tbb::parallel_for(
         tbb::blocked_range<std::uint32_t>(0, static_cast<std::uint32_t>(positions.size()), 1024),
         [&](const auto& range) {
             for (std::uint32_t v = range.begin(); v < range.end(); ++v) {
                 if (!table_.has_vertex(v))
                     continue;
-                auto& a = quadrics_[v].a;
+                Node& node = nodes_[v];
+                auto& a = node.quadric.a;
                 const Vec3& p = positions_[v];
                 std::uint32_t c = table_.corner(v);
                 do {
@@ -86,18 +80,20 @@ Collapser::Collapser(CornerTable& table, std::span<const Vec3> positions,
                     }
                     c = table_.swing(c);
                 } while (c != table_.corner(v));
-                const auto shapes = errors_.shapes(errors_.labels()[v]);
-                off_[v] = shapes.empty();
+                node.label = errors_.labels()[v];
+                const auto shapes = errors_.shapes(node.label);
+                node.stays = frozen[v] != 0;
+                node.fixed = shapes.size() == PrimitiveSet::kMost;
+                node.off = shapes.empty();
                 for (const std::uint32_t shape : shapes) {
                     const FieldProbe::Value at = errors_.of(shape, p);
-                    off_[v] |= std::abs(at.value_m) > rules_.off_m;
-                    if (shapes.size() == 1 && !errors_.has_closed_form(shape))
+                    node.off = node.off || std::abs(at.value_m) > rules_.off_m;
+                    if (slopes_[v].shape == FaceErrors::kNone && !errors_.has_closed_form(shape))
                         slopes_[v] = {shape,
                                       {static_cast<float>(at.gradient.x),
                                        static_cast<float>(at.gradient.y),
                                        static_cast<float>(at.gradient.z)}};
                 }
-                clear_m_[v] = static_cast<float>(errors_.clearance(p, errors_.labels()[v]));
             }
         });
 }
@@ -146,8 +142,28 @@ Collapser::Blocks Collapser::divide(double block_m, double shift_m) {
     return blocks;
 }
 
+/// A collapse takes place among inner vertices and leaves them inner, so this is known once a pass.
+void Collapser::find_inner() {
+    std::fill(inner_.begin(), inner_.end(), std::uint8_t{1});
+    tbb::parallel_for(
+        tbb::blocked_range<std::size_t>(0, table_.n_triangles(), 4096), [&](const auto& range) {
+            for (std::size_t t = range.begin(); t < range.end(); ++t) {
+                if (!table_.has_triangle(t))
+                    continue;
+                const Triangle v = table_.triangle(t);
+                if (owners_[v[0]] == owners_[v[1]] && owners_[v[1]] == owners_[v[2]])
+                    continue;
+                for (std::size_t k = 0; k < 3; ++k)
+                    if (owners_[v[k]] != owners_[v[(k + 1) % 3]])
+                        for (const std::uint32_t end : {v[k], v[(k + 1) % 3]})
+                            std::atomic_ref(inner_[end]).store(0, std::memory_order_relaxed);
+            }
+        });
+}
+
 void Collapser::pass(double block_m, double shift_m, Progress* progress) {
     const Blocks blocks = divide(block_m, shift_m);
+    find_inner();
     tbb::enumerable_thread_specific<Buckets> queues;
     std::atomic<std::size_t> n_done{0};
     const std::size_t n = blocks.first.size() - 1, step = std::max<std::size_t>(1, n / 100);
@@ -171,12 +187,6 @@ void Collapser::run(std::span<const std::uint32_t> vertices, Buckets& queue) {
             c = table_.swing(c);
         } while (c != table_.corner(v));
     };
-    // A collapse takes place among inner vertices and leaves them inner, so this is known once.
-    for (const std::uint32_t v : vertices) {
-        bool inner = true;
-        each_neighbour(v, [&](std::uint32_t u) { inner = inner && owners_[u] == owners_[v]; });
-        inner_[v] = inner;
-    }
     for (const std::uint32_t v : vertices)
         if (inner_[v])
             each_neighbour(v, [&](std::uint32_t u) {
@@ -185,8 +195,7 @@ void Collapser::run(std::span<const std::uint32_t> vertices, Buckets& queue) {
             });
     while (!queue.empty()) {
         const Entry e = queue.pop();
-        if (!table_.has_vertex(e.a) || !table_.has_vertex(e.b) || stamps_[e.a] != e.stamp_a ||
-            stamps_[e.b] != e.stamp_b)
+        if (nodes_[e.a].stamp != e.stamp_a || nodes_[e.b].stamp != e.stamp_b)
             continue;
         std::uint32_t kept = e.b;
         if (!try_collapse(e.a, e.b)) {
@@ -194,7 +203,8 @@ void Collapser::run(std::span<const std::uint32_t> vertices, Buckets& queue) {
                 continue;
             kept = e.a;
         }
-        ++stamps_[kept];
+        ++nodes_[e.a].stamp;
+        ++nodes_[e.b].stamp;
         each_neighbour(kept, [&](std::uint32_t u) {
             if (inner_[u])
                 push(kept, u, queue);
@@ -210,33 +220,30 @@ void Collapser::run(std::span<const std::uint32_t> vertices, Buckets& queue) {
     }
 }
 
-bool Collapser::may_move(std::uint32_t a, std::uint32_t b) const {
-    if (off_[b] || frozen_[a])
-        return false;
-    const std::uint32_t la = errors_.labels()[a], lb = errors_.labels()[b];
-    return off_[a] || (errors_.within(la, lb) && errors_.n_primitives(la) < PrimitiveSet::kMost);
-}
-
-float Collapser::cost(std::uint32_t a, std::uint32_t b) const {
-    if (off_[a])
-        return kAtOnce;
-    const Vec3 d = positions_[b] - positions_[a];
-    return std::max(0.f, quadrics_[a].at(d)) + quadrics_[b].c +
-           kLengthWeight * static_cast<float>(length_squared(d));
+bool Collapser::may_move(const Node& a, const Node& b) const {
+    return !b.off && !a.stays &&
+           (a.off || (!a.fixed && (a.label == b.label || errors_.within(a.label, b.label))));
 }
 
 void Collapser::push(std::uint32_t a, std::uint32_t b, Buckets& queue) const {
-    const bool there = may_move(a, b), back = may_move(b, a);
+    const Node &s = nodes_[a], &t = nodes_[b];
+    const bool there = may_move(s, t), back = may_move(t, s);
     if (!there && !back)
         return;
-    const float to_b = there ? cost(a, b) : kNever, to_a = back ? cost(b, a) : kNever;
+    const Vec3 d = positions_[b] - positions_[a];
+    const float along = kLengthWeight * static_cast<float>(length_squared(d));
+    const auto cost = [&](const Node& from, const Node& to, const Vec3& by) {
+        return from.off ? kAtOnce : std::max(0.f, from.quadric.at(by)) + to.quadric.c + along;
+    };
+    const float to_b = there ? cost(s, t, d) : kNever, to_a = back ? cost(t, s, -d) : kNever;
     if (to_a < to_b)
-        std::swap(a, b);
-    queue.push(std::min(to_a, to_b), {a, b, stamps_[a], stamps_[b]});
+        queue.push(to_a, {b, a, t.stamp, s.stamp});
+    else
+        queue.push(to_b, {a, b, s.stamp, t.stamp});
 }
 
 bool Collapser::try_collapse(std::uint32_t a, std::uint32_t b) {
-    if (!may_move(a, b))
+    if (!may_move(nodes_[a], nodes_[b]))
         return false;
     Ring ring_a, ring_b;
     if (!table_.ring(a, ring_a) || !table_.ring(b, ring_b) ||
@@ -246,32 +253,27 @@ bool Collapser::try_collapse(std::uint32_t a, std::uint32_t b) {
     if (c == kNone || !shapely(a, b, ring_a) || !legal(b, ring_a))
         return false;
     table_.collapse(c, ring_a);
-    quadrics_[b].add(quadrics_[a], positions_[a] - positions_[b]);
+    nodes_[b].quadric.add(nodes_[a].quadric, positions_[a] - positions_[b]);
     return true;
 }
 
 /// Whether the cubic through the values and gradients at both ends of an edge leaves hope that its
 /// middle is near enough; spares most of the samples that would say no.
 bool Collapser::may_fit(std::uint32_t a, std::uint32_t b) const {
-    const Slope &s = slopes_[a], &t = slopes_[b];
-    if (s.shape == FaceErrors::kNone || s.shape != t.shape)
+    const FaceSlope &s = slopes_[a], &t = slopes_[b];
+    if (s.shape == FaceErrors::kNone || s.shape != t.shape ||
+        errors_.n_primitives(nodes_[a].label) > 1 || errors_.n_primitives(nodes_[b].label) > 1)
         return true;
-    const Vec3 d = positions_[b] - positions_[a];
-    const double at_middle =
-        ((s.gradient[0] - t.gradient[0]) * d.x + (s.gradient[1] - t.gradient[1]) * d.y +
-         (s.gradient[2] - t.gradient[2]) * d.z) /
-        8;
+    const double at_middle = dot(s.at() - t.at(), positions_[b] - positions_[a]) / 8;
     return std::abs(at_middle) <= kHope * (rules_.face.centred ? 2 : 1) * rules_.face.face_m;
 }
 
 /// Whether no face turns over, or becomes a sliver.
 bool Collapser::shapely(std::uint32_t a, std::uint32_t b, const Ring& ring) const {
     const Vec3 &from = positions_[a], &to = positions_[b];
-    for (const std::uint32_t c : ring.all()) {
-        const std::uint32_t v = table_.vertex(CornerTable::next(c)),
-                            w = table_.vertex(CornerTable::previous(c));
+    return ring.each([&](std::uint32_t v, std::uint32_t w) {
         if (v == b || w == b)
-            continue;
+            return true;
         if (!may_fit(b, v))
             return false;
         const Vec3 &p = positions_[v], &q = positions_[w];
@@ -280,30 +282,65 @@ bool Collapser::shapely(std::uint32_t a, std::uint32_t b, const Ring& ring) cons
                      edge = std::max({e, length_squared(p - to), length_squared(q - to)});
         if (dot(before, after) <= rules_.least_turn * area_before * area)
             return false;
-        if (area < rules_.least_quality * edge &&
-            area * std::max({e, length_squared(p - from), length_squared(q - from)}) <
-                area_before * edge)
-            return false;
-    }
-    return true;
+        return area >= rules_.least_quality * edge ||
+               area * std::max({e, length_squared(p - from), length_squared(q - from)}) >=
+                   area_before * edge;
+    });
 }
 
-bool Collapser::legal(std::uint32_t b, const Ring& ring) const {
-    const auto& labels = errors_.labels();
-    FaceErrors::Rules rules = rules_.face;
-    rules.clear_m = 0.999 * static_cast<double>(clear_m_[b]); // rounded to single precision
-    for (const std::uint32_t c : ring.all()) {
-        const std::uint32_t v = table_.vertex(CornerTable::next(c)),
-                            w = table_.vertex(CornerTable::previous(c));
-        if (v == b || w == b)
-            continue;
-        rules.exact_corners = !off_[v] && !off_[w];
-        if (errors_.bound({positions_[b], positions_[v], positions_[w]},
-                          {labels[b], labels[v], labels[w]},
-                          rules) == std::numeric_limits<double>::infinity())
-            return false;
+const Collapser::Room& Collapser::room(std::uint32_t v) {
+    Room& room = rooms_[v];
+    if (room.any_m < 0) {
+        const auto clear = errors_.clearance(positions_[v], nodes_[v].label);
+        const auto down = [](double x) { return static_cast<float>(std::max(0., 0.999 * x)); };
+        room = {down(clear.sampled), down(clear.any)};
     }
-    return true;
+    return room;
+}
+
+/// Whether a face keeps the rules. \param clear_m  from its first corner, to other primitives.
+bool Collapser::fits(const Triangle& face, double clear_m, FaceErrors::Rules rules) const {
+    const FaceErrors::Labels l = {nodes_[face[0]].label, nodes_[face[1]].label,
+                                  nodes_[face[2]].label};
+    const FaceErrors::Corners p = {positions_[face[0]], positions_[face[1]], positions_[face[2]]};
+    const std::array<FaceSlope, 3> slopes = {slopes_[face[0]], slopes_[face[1]], slopes_[face[2]]};
+    rules.slopes = &slopes;
+    constexpr double kBroken = std::numeric_limits<double>::infinity();
+    const auto asked = [&] { return errors_.bound(p, l, rules) < kBroken; };
+    const PrimitiveSet shared = errors_.shared(l);
+    if (shared.size() != 1 || !rules.exact_corners)
+        return asked();
+    const bool alone = clear_m > 0 && std::max(length_squared(p[1] - p[0]),
+                                               length_squared(p[2] - p[0])) < clear_m * clear_m;
+    const std::uint32_t shape = shared[0];
+    const Vec3 n = cross(p[1] - p[0], p[2] - p[0]);
+    if (errors_.has_closed_form(shape))
+        return (alone && errors_.fits_ball(shape, p[0], n, rules)) || asked();
+    if (slopes[0].shape != shape || slopes[1].shape != shape || slopes[2].shape != shape)
+        return asked();
+    // The parabolas at its corners leave no doubt about most faces, and spare their samples.
+    const auto [range, skew, is_smooth] =
+        parabolas(p, {}, {slopes[0].at(), slopes[1].at(), slopes[2].at()});
+    const double error = rules.centred ? (range.hi - range.lo) / 2 : range.most();
+    if (error > kHope * rules.face_m)
+        return false;
+    if (!is_smooth || error + skew > kNoDoubt * rules.face_m)
+        return asked();
+    return dot(n, range.gradient) >= rules.turn_cosine * length(n) * length(range.gradient) &&
+           (alone || errors_.bound_beside(shape, range, p, l, rules) < kBroken);
+}
+
+bool Collapser::legal(std::uint32_t b, const Ring& ring) {
+    FaceErrors::Rules rules = rules_.face;
+    const Room& room_b = room(b);
+    rules.clear_m = static_cast<double>(room_b.sampled_m);
+    const double clear = errors_.n_primitives(nodes_[b].label) == 1
+                             ? static_cast<double>(room_b.any_m) - errors_.reach_m(rules)
+                             : 0;
+    return ring.each([&](std::uint32_t v, std::uint32_t w) {
+        rules.exact_corners = !nodes_[v].off && !nodes_[w].off;
+        return v == b || w == b || fits({b, v, w}, clear, rules);
+    });
 }
 
 } // namespace taihu

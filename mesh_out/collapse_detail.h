@@ -37,9 +37,22 @@ private:
         std::array<float, 6> a{};
         std::array<float, 3> b{};
         float c = 0;
-        float at(const Vec3& d) const;
+        float at(const Vec3& d) const {
+            const auto x = static_cast<float>(d.x), y = static_cast<float>(d.y),
+                       z = static_cast<float>(d.z);
+            return x * (a[0] * x + 2 * (a[1] * y + a[2] * z + b[0])) +
+                   y * (a[3] * y + 2 * (a[4] * z + b[1])) + z * (a[5] * z + 2 * b[2]) + c;
+        }
         /// Adds `other`, whose vertex lies at `d` from this one.
         void add(const Quadric& other, const Vec3& d);
+    };
+    struct alignas(64) Node { ///< what the queue asks of a vertex
+        Quadric quadric;
+        std::uint32_t stamp = 0; ///< of its last change; what the queue has of before is stale
+        std::uint32_t label = 0;
+        bool stays = false; ///< frozen
+        bool off = false;   ///< off its primitives, or without any
+        bool fixed = false; ///< a corner of the solid
     };
     struct Entry {
         std::uint32_t a, b, stamp_a, stamp_b;
@@ -56,36 +69,36 @@ private:
         std::vector<std::vector<Entry>> entries_{kBuckets};
         std::size_t lowest_ = kBuckets, n_ = 0;
     };
+    struct Room { ///< FaceErrors::clearance(), rounded down; not yet known below 0
+        float sampled_m = -1, any_m = -1;
+    };
     struct Blocks {
         std::vector<std::uint32_t> first, vertices;
     };
 
     Blocks divide(double block_m, double shift_m);
+    void find_inner();
     void run(std::span<const std::uint32_t> vertices, Buckets& queue);
     void push(std::uint32_t a, std::uint32_t b, Buckets& queue) const;
-    bool may_move(std::uint32_t a, std::uint32_t b) const;
+    bool may_move(const Node& a, const Node& b) const;
     bool try_collapse(std::uint32_t a, std::uint32_t b);
-    bool legal(std::uint32_t b, const Ring& ring) const;
+    bool legal(std::uint32_t b, const Ring& ring);
+    const Room& room(std::uint32_t v);
+    bool fits(const Triangle& face, double clear_m, FaceErrors::Rules rules) const;
     bool may_fit(std::uint32_t a, std::uint32_t b) const;
     bool shapely(std::uint32_t a, std::uint32_t b, const Ring& ring) const;
-    float cost(std::uint32_t a, std::uint32_t b) const;
 
     CornerTable& table_;
     std::span<const Vec3> positions_;
-    std::span<const std::uint8_t> frozen_;
     const FaceErrors& errors_;
     Rules rules_;
-    std::vector<Quadric> quadrics_;
-    std::vector<std::uint32_t> stamps_, owners_;
+    std::vector<Node> nodes_;
+    std::vector<std::uint32_t> owners_;
     std::vector<std::uint8_t> inner_; ///< the ring lies in the block of the vertex
     std::vector<std::uint8_t> open_;  ///< not yet tried with its whole ring in one block
-    std::vector<std::uint8_t> off_;
-    std::vector<float> clear_m_; ///< FaceErrors::clearance()
-    struct Slope {
-        std::uint32_t shape = FaceErrors::kNone;
-        std::array<float, 3> gradient{};
-    };
-    std::vector<Slope> slopes_; ///< of the one primitive that a vertex lies on, if not a ball
+    std::vector<Room> rooms_;
+    /// Of the first primitive without a closed form at a vertex.
+    std::vector<FaceSlope> slopes_;
 };
 
 } // namespace taihu

@@ -53,22 +53,29 @@ CornerTable::CornerTable(std::size_t n_vertices, std::span<const Triangle> trian
     const Incidence incidence(n_vertices, vertices_);
     std::atomic<bool> broken{false};
     tbb::parallel_for(tbb::blocked_range<std::size_t>(0, n_vertices, 4096), [&](const auto& range) {
+        std::vector<std::uint32_t> to, from; // the other ends of the edges of each corner
         for (std::size_t v = range.begin(); v < range.end(); ++v) {
             const auto around = incidence.of(v);
             if (!around.empty())
                 corners_[v] = around.front();
+            to.clear();
+            from.clear();
             for (const std::uint32_t c : around) {
-                const std::uint32_t to = vertices_[next(c)];
+                to.push_back(vertices_[next(c)]);
+                from.push_back(vertices_[previous(c)]);
+            }
+            for (std::size_t i = 0; i < around.size(); ++i) {
                 int n_out = 0, n_in = 0;
-                for (const std::uint32_t d : around) {
-                    n_out += vertices_[next(d)] == to;
-                    if (vertices_[previous(d)] == to) {
-                        opposites_[previous(c)] = next(d);
-                        ++n_in;
-                    }
+                std::size_t other = 0;
+                for (std::size_t k = 0; k < around.size(); ++k) {
+                    n_out += to[k] == to[i];
+                    n_in += from[k] == to[i];
+                    other = from[k] == to[i] ? k : other;
                 }
                 if (n_out != 1 || n_in != 1)
                     broken = true;
+                else
+                    opposites_[previous(around[i])] = next(around[other]);
             }
         }
     });
@@ -95,7 +102,8 @@ bool CornerTable::ring(std::uint32_t v, Ring& out) const {
     do {
         if (out.n == kMostCorners)
             return false;
-        out.corners[out.n++] = c;
+        out.corners[out.n] = c;
+        out.neighbours[out.n++] = vertices_[next(c)];
         c = swing(c);
     } while (c != corners_[v]);
     return true;
@@ -105,12 +113,12 @@ std::uint32_t CornerTable::collapsible(std::uint32_t a, std::uint32_t b, const R
                                        const Ring& ring_b) const {
     std::uint32_t edge = kNone;
     int n_common = 0;
-    for (const std::uint32_t c : ring_a.all()) {
-        const std::uint32_t v = vertices_[next(c)];
+    for (std::size_t i = 0; i < ring_a.n; ++i) {
+        const std::uint32_t v = ring_a.neighbours[i];
         if (v == b)
-            edge = c;
-        for (const std::uint32_t d : ring_b.all())
-            n_common += vertices_[next(d)] == v;
+            edge = ring_a.corners[i];
+        for (std::size_t k = 0; k < ring_b.n; ++k)
+            n_common += ring_b.neighbours[k] == v;
     }
     if (edge == kNone || n_common != 2)
         return kNone;

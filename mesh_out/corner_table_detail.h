@@ -17,10 +17,20 @@ public:
     static constexpr std::uint32_t kNone = 0xffffffffu;
     static constexpr std::size_t kMostCorners = 40; ///< round a vertex, that are worked on
 
-    /// The corners round a vertex, counter-clockwise.
+    /// The corners round a vertex, counter-clockwise; in its triangle corner k comes before
+    /// neighbour k and after neighbour k + 1.
     struct Ring {
         std::size_t n = 0;
-        std::array<std::uint32_t, kMostCorners> corners;
+        std::array<std::uint32_t, kMostCorners> corners, neighbours;
+        /// Calls visit(v, w) for each triangle, v and w the other two vertices, until it says
+        /// false.
+        template <class Visit>
+        bool each(Visit&& visit) const {
+            for (std::size_t k = 0; k < n; ++k)
+                if (!visit(neighbours[k], neighbours[k + 1 < n ? k + 1 : 0]))
+                    return false;
+            return true;
+        }
         std::span<const std::uint32_t> all() const { return {corners.data(), n}; }
     };
 

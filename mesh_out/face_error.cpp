@@ -15,10 +15,11 @@ constexpr double kInfinity = std::numeric_limits<double>::infinity();
 constexpr double kTouch = 0.02; ///< of a spacing: deeper is in, for primitives that only pass by
 constexpr std::size_t kMostSteps = 12; ///< along an edge, of samples
 constexpr int kMostHalvings = 2;
-constexpr double kSmallest = 0.2;     ///< of a spacing: parts of faces are not divided further
-constexpr double kStep = 1.6;         ///< spacings from sample to sample
-constexpr double kFineStep = 0.5;     ///< where a primitive turns out to have creases
-constexpr double kSteep = 0.95;       ///< gradients of distances have length 1
+constexpr double kSmallest = 0.2; ///< of a spacing: parts of faces are not divided further
+constexpr double kStep = 1.6;     ///< spacings from sample to sample
+constexpr double kFineStep = 0.5; ///< where a primitive turns out to have creases
+constexpr double kSteep = 0.95;   ///< gradients of distances have length 1
+constexpr double kSmooth = 2.85;  ///< length of the sum of three gradients of 1 that differ little
 constexpr double kPlanarMargin = 1.1; ///< rims of other surfaces are bent; planes are not
 
 Vec3 middle(const FaceErrors::Corners& f) {
@@ -33,6 +34,11 @@ double radius_about(const Vec3& m, const FaceErrors::Corners& f) {
 double longest_edge(const FaceErrors::Corners& f) {
     return std::sqrt(std::max(
         {length_squared(f[0] - f[1]), length_squared(f[1] - f[2]), length_squared(f[2] - f[0])}));
+}
+
+std::size_t steps(const FaceErrors::Corners& f, double step) {
+    return std::clamp(static_cast<std::size_t>(std::ceil(longest_edge(f) / step)), std::size_t{2},
+                      kMostSteps);
 }
 
 std::array<FaceErrors::Corners, 4> quarters(const FaceErrors::Corners& f) {
@@ -59,8 +65,11 @@ double FaceErrors::bound(const Corners& face, const Labels& labels, const Rules&
     Range range;
     const std::uint32_t shape =
         own(face, labels, rules.exact_corners, range, (rules.centred ? 2 : 1) * rules.face_m);
-    if (shape == kNone)
-        return kInfinity;
+    return shape == kNone ? kInfinity : bound_beside(shape, range, face, labels, rules);
+}
+
+double FaceErrors::bound_beside(std::uint32_t shape, const Range& range, const Corners& face,
+                                const Labels& labels, const Rules& rules) const {
     double most = rules.centred ? (range.hi - range.lo) / 2 : range.most();
     if (most > rules.face_m)
         return kInfinity;
@@ -106,32 +115,55 @@ double FaceErrors::bound(const Corners& face, const Labels& labels, const Rules&
     return most;
 }
 
-double FaceErrors::clearance(const Vec3& p, std::uint32_t label) const {
+FaceErrors::Clearance FaceErrors::clearance(const Vec3& p, std::uint32_t label) const {
     const std::array<int, 3> at = {coordinate(p.x, 0), coordinate(p.y, 1), coordinate(p.z, 2)};
     const auto list = near(at);
-    double least = pad_; // the lists know no more
     const double off_center = length(p - center_of(at));
+    const double known = list_reach() - off_center; // the lists know no more
+    Clearance least{known, known};
     for (const std::uint32_t& shape : list) {
         const Shape& s = shapes_[shape];
-        if (s.is_ball || sets_[label].has(shape))
+        if (sets_[label].has(shape))
             continue;
+        if (s.is_ball) {
+            least.any = std::min(least.any, std::abs(length(p - s.center) - s.radius));
+            continue;
+        }
         const double value = center_values_[static_cast<std::size_t>(&shape - near_.data())];
         const double at_least = std::abs(value) - off_center;
-        least =
-            std::min(least, at_least > 2 * spacing_ ? at_least
+        least.sampled = std::min(least.sampled, at_least > 2 * spacing_
+                                                    ? at_least
                                                     : std::abs(field_.of(s.primitive, p).value_m));
     }
+    least.any = std::min(least.any, least.sampled);
     return least;
+}
+
+bool FaceErrors::fits_ball(std::uint32_t shape, const Vec3& corner, const Vec3& normal,
+                           const Rules& rules) const {
+    // No point of the face is nearer to the centre than its plane, and none farther than a corner.
+    const Shape& s = shapes_[shape];
+    const double area = length(normal), h = s.sign * dot(normal, corner - s.center),
+                 r = s.radius * area;
+    return r - h <= (rules.centred ? 2 : 1) * rules.face_m * area && h >= rules.turn_cosine * r;
+}
+
+double FaceErrors::reach_m(const Rules& rules) const {
+    return rules.face_m + kTouch * spacing_;
+}
+
+PrimitiveSet FaceErrors::shared(const Labels& labels) const {
+    if (labels[0] == labels[1] && labels[1] == labels[2])
+        return sets_[labels[0]];
+    return sets_[labels[0]].common(sets_[labels[1]]).common(sets_[labels[2]]);
 }
 
 std::uint32_t FaceErrors::own(const Corners& face, const Labels& labels, bool exact_corners,
                               Range& out, double give_up_m) const {
     std::uint32_t best = kNone;
     double least = kInfinity;
-    for (const std::uint32_t s : sets_[labels[0]].all()) {
-        if ((labels[1] != labels[0] && !sets_[labels[1]].has(s)) ||
-            (labels[2] != labels[0] && !sets_[labels[2]].has(s)))
-            continue;
+    const PrimitiveSet candidates = shared(labels);
+    for (const std::uint32_t s : candidates.all()) {
         constexpr CornerValues kOnIt{};
         const Range r = range(s, face, exact_corners ? &kOnIt : nullptr, give_up_m);
         if (r.most() < least) {
@@ -180,8 +212,7 @@ double FaceErrors::sample(Primitive primitive, const Vec3& p, Range& range) cons
 FaceErrors::Range FaceErrors::sampled_range(const Shape& shape, const Corners& f,
                                             const CornerValues* known, double give_up_m,
                                             double step) const {
-    const std::size_t n = std::clamp(static_cast<std::size_t>(std::ceil(longest_edge(f) / step)),
-                                     std::size_t{2}, kMostSteps);
+    const std::size_t n = steps(f, step);
     std::array<double, (kMostSteps + 1) * (kMostSteps + 1)> values;
     const auto at = [&](std::size_t u, std::size_t v) -> double& {
         return values[u * (kMostSteps + 1) + v];
@@ -223,15 +254,50 @@ FaceErrors::Range FaceErrors::sampled_range(const Shape& shape, const Corners& f
     return r;
 }
 
+std::size_t FaceErrors::n_steps(const Corners& f) const {
+    return steps(f, kStep * spacing_);
+}
+
+void FaceErrors::samples(std::uint32_t shape, const Corners& f, std::size_t n, float* out) const {
+    Range ignored;
+    for (std::size_t u = 0; u <= n; ++u)
+        for (std::size_t v = 0; u + v <= n; ++v) {
+            const double x = static_cast<double>(u) / static_cast<double>(n),
+                         y = static_cast<double>(v) / static_cast<double>(n);
+            *out++ = static_cast<float>(sample(shapes_[shape].primitive,
+                                               f[1] * x + f[2] * y + f[0] * (1 - x - y), ignored));
+        }
+}
+
+/// Of a primitive that has corners of the face on it, or comes near.
+FaceErrors::Range FaceErrors::range_beside(std::uint32_t shape, const Corners& face,
+                                           const CornerValues& corners,
+                                           const std::array<Vec3, 3>& gradients,
+                                           const Rules& rules) const {
+    if (rules.slopes && !shapes_[shape].is_ball) {
+        const FaceParabolas p = parabolas(face, corners, gradients);
+        if (p.is_smooth) // it is not where a gradient is not known: a sum with a 0
+            return {p.range.lo - p.skew, p.range.hi + p.skew, p.range.gradient};
+    }
+    return range(shape, face, &corners);
+}
+
 double FaceErrors::against(std::uint32_t own, const Range& own_range, std::uint32_t other,
                            const Corners& face, const Labels& labels, const Rules& rules) const {
     CornerValues corners{};
+    std::array<Vec3, 3> gradients;
     bool is_labelled = false;
     for (std::size_t k = 0; k < 3; ++k) {
-        const bool has = sets_[labels[k]].has(other);
+        const bool has = labels[k] != kNone && sets_[labels[k]].has(other);
         is_labelled = is_labelled || has;
-        if (!rules.exact_corners || !has)
-            corners[k] = of(other, face[k]).value_m;
+        if (rules.exact_corners && has) {
+            if (rules.slopes && (*rules.slopes)[k].shape == other)
+                gradients[k] = (*rules.slopes)[k].at();
+            continue;
+        }
+        const FieldProbe::Value at = of(other, face[k]);
+        corners[k] = at.value_m;
+        gradients[k] = at.gradient;
     }
     const double lo = std::min({corners[0], corners[1], corners[2]}),
                  hi = std::max({corners[0], corners[1], corners[2]});
@@ -243,17 +309,29 @@ double FaceErrors::against(std::uint32_t own, const Range& own_range, std::uint3
         return std::abs(n.value_m) > tolerance && n.primitive != shapes_[own].primitive ? kInfinity
                                                                                         : 0;
     }
-    const Range range_there = range(other, face, &corners);
+    const Range range_there = range_beside(other, face, corners, gradients, rules);
     Meeting pair{own, other, -lo >= hi ? 1. : -1., rules};
     if (pierces_nothing && (pair.turn > 0 ? range_there.hi : -range_there.lo) > tolerance)
         return kInfinity;
     double most = meeting(pair, face, own_range, range_there, 0);
-    // Corners on both sides of it do not say on which the solid is.
-    if (rules.may_pierce && lo < 0 && hi > 0) {
+    // The corners alone do not say on which side of it the solid is.
+    if (rules.may_pierce && !is_sure_of_side(own, corners, face)) {
         pair.turn = -pair.turn;
         most = std::max(most, meeting(pair, face, own_range, range_there, 0));
     }
     return most;
+}
+
+/// Whether the field goes by `own` at the corner farthest from another primitive, which so has the
+/// solid on that side.
+bool FaceErrors::is_sure_of_side(std::uint32_t own, const CornerValues& other,
+                                 const Corners& face) const {
+    const auto far = static_cast<std::size_t>(
+        std::max_element(other.begin(), other.end(),
+                         [](double a, double b) { return std::abs(a) < std::abs(b); }) -
+        other.begin());
+    const FieldProbe::Nearest n = field_.at(face[far]);
+    return n.primitive == shapes_[own].primitive && std::abs(other[far]) > std::abs(n.value_m);
 }
 
 /// Of the part of a face that lies past the rim of two primitives, an upper bound of the distance
@@ -291,7 +369,7 @@ double FaceErrors::past_rim(const Meeting& pair, const Corners& face, double own
                    h = normalized(of(pair.other, m).gradient);
         const double cosine = dot(g, h);
         if (other <= 0 && other <= own * cosine)
-            return own;
+            return 0; // not past it: straight above its own surface
         return kPlanarMargin * past_wedge(own, other, cosine);
     }
     // In the half plane through the axis of both balls the rim is the point where two circles meet;
@@ -309,7 +387,7 @@ double FaceErrors::past_rim(const Meeting& pair, const Corners& face, double own
                           (s.radius * s.radius + t.radius * t.radius - apart * apart) /
                           (2 * s.radius * t.radius);
     if (other <= 0 && other <= own * cosine)
-        return own;
+        return 0;
     if (own < other * cosine || other < own * cosine)
         return std::max(own, other);
     if (!meet(s.radius + pair.turn * s.sign * own, t.radius + pair.turn * t.sign * other, z_deep,
@@ -319,13 +397,36 @@ double FaceErrors::past_rim(const Meeting& pair, const Corners& face, double own
 }
 
 double FaceErrors::searched(const Corners& face, double enough_m, double give_up_m) const {
-    const auto y = surface_point_near(field_, middle(face), 4 * pad_);
-    const double far = y ? radius_about(*y, face) : kInfinity;
-    if (far <= enough_m || longest_edge(face) < kSmallest * enough_m)
-        return far;
+    const Vec3 m = middle(face);
+    const double radius = radius_about(m, face);
+    const FieldProbe::Nearest n = field_.at(m);
+    const double least = std::abs(n.value_m); // distances are never below it
+    if (least > give_up_m)
+        return least;
+    const Rules rules{.face_m = enough_m, .rim_m = enough_m, .may_pierce = true};
+    if (const std::uint32_t shape = shape_of(n.primitive); shape != kNone && least <= enough_m) {
+        const Range r = range(shape, face, nullptr, enough_m);
+        // No corner is told to lie on anything.
+        if (const double known = bound_beside(shape, r, face, {kNone, kNone, kNone}, rules);
+            known <= enough_m)
+            return known;
+    }
+    const bool is_small = longest_edge(face) < kSmallest * enough_m;
+    if (std::hypot(least, radius) <= enough_m || is_small) {
+        double far = kInfinity;
+        // Where the way from the middle leads nowhere, those from the corners may.
+        for (const Vec3& from : {m, face[0], face[1], face[2]}) {
+            if (const auto y = surface_point_near(field_, from, 4 * pad_))
+                far = std::min(far, radius_about(*y, face));
+            if (far < kInfinity)
+                break;
+        }
+        if (far <= enough_m || is_small)
+            return far;
+    }
     double most = 0;
     for (const Corners& part : quarters(face)) {
-        most = std::max(most, searched(part, enough_m, give_up_m));
+        most = std::max(most, searched(part, std::max(enough_m, most), give_up_m));
         if (most > give_up_m)
             return most;
     }

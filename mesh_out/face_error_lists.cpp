@@ -1,5 +1,6 @@
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <tuple>
 
 #include <tbb/blocked_range.h>
@@ -50,6 +51,11 @@ int FaceErrors::coordinate(double x, int axis) const {
                       static_cast<int>(n_[static_cast<std::size_t>(axis)]) - 1);
 }
 
+std::size_t FaceErrors::cell_of(const std::array<int, 3>& c) const {
+    return (static_cast<std::size_t>(c[0]) * n_[1] + static_cast<std::size_t>(c[1])) * n_[2] +
+           static_cast<std::size_t>(c[2]);
+}
+
 void FaceErrors::find_near(const LabelledMesh& mesh, std::vector<std::vector<Primitive>>& near) {
     cells_.assign(n_[0] * n_[1] * n_[2], kNone);
     for (const Vec3& p : mesh.positions) {
@@ -70,10 +76,9 @@ void FaceErrors::find_near(const LabelledMesh& mesh, std::vector<std::vector<Pri
             listed.push_back(c);
         }
     near.resize(listed.size());
-    const double half_diagonal = std::sqrt(3.) / 2 * cell_;
     tbb::parallel_for(tbb::blocked_range<std::size_t>(0, listed.size(), 64), [&](const auto& r) {
         for (std::size_t i = r.begin(); i < r.end(); ++i) {
-            field_.near(center_of(coordinates(listed[i])), half_diagonal + pad_, near[i]);
+            field_.near(center_of(coordinates(listed[i])), list_reach(), near[i]);
         }
     });
 }
@@ -98,7 +103,8 @@ void FaceErrors::find_center_values() {
 
 void FaceErrors::find_shapes(const LabelledMesh& mesh) {
     std::vector<Primitive> used = near_;
-    std::vector<PrimitiveSet> all = mesh.labels;
+    std::vector<PrimitiveSet> all; // neighbours mostly share theirs
+    std::unique_copy(mesh.labels.begin(), mesh.labels.end(), std::back_inserter(all));
     std::sort(all.begin(), all.end(), before);
     all.erase(std::unique(all.begin(), all.end()), all.end());
     for (const PrimitiveSet& set : all)
@@ -127,19 +133,40 @@ void FaceErrors::find_shapes(const LabelledMesh& mesh) {
             shapes.add(shape_of(p));
         sets_.push_back(shapes);
     }
+    n_sorted_sets_ = sets_.size();
     labels_.resize(mesh.labels.size());
-    tbb::parallel_for(std::size_t{0}, labels_.size(), [&](std::size_t v) {
-        labels_[v] = static_cast<std::uint32_t>(
-            std::lower_bound(all.begin(), all.end(), mesh.labels[v], before) - all.begin());
-    });
+    tbb::parallel_for(
+        tbb::blocked_range<std::size_t>(0, labels_.size(), 1024), [&](const auto& range) {
+            for (std::size_t v = range.begin(); v < range.end(); ++v)
+                labels_[v] =
+                    v > range.begin() && mesh.labels[v] == mesh.labels[v - 1]
+                        ? labels_[v - 1]
+                        : static_cast<std::uint32_t>(
+                              std::lower_bound(all.begin(), all.end(), mesh.labels[v], before) -
+                              all.begin());
+        });
+}
+
+/// The number of a primitive's shape; kNone when it comes near nothing.
+std::uint32_t FaceErrors::shape_of(Primitive primitive) const {
+    const auto at = std::lower_bound(shapes_.begin(), shapes_.end(), primitive,
+                                     [](const Shape& s, Primitive p) { return s.primitive < p; });
+    return at == shapes_.end() || at->primitive != primitive
+               ? kNone
+               : static_cast<std::uint32_t>(at - shapes_.begin());
 }
 
 std::uint32_t FaceErrors::label_of(const PrimitiveSet& shapes) {
-    const auto at = std::find(sets_.begin(), sets_.end(), shapes);
-    const auto number = static_cast<std::uint32_t>(at - sets_.begin());
-    if (at == sets_.end())
+    // The first ones are sorted as their primitives are.
+    const auto first_end = sets_.begin() + static_cast<std::ptrdiff_t>(n_sorted_sets_);
+    const auto at = std::lower_bound(sets_.begin(), first_end, shapes, before);
+    if (at != first_end && *at == shapes)
+        return static_cast<std::uint32_t>(at - sets_.begin());
+    const auto [known, is_new] = more_sets_.try_emplace({shapes.all().begin(), shapes.all().end()},
+                                                        static_cast<std::uint32_t>(sets_.size()));
+    if (is_new)
         sets_.push_back(shapes);
-    return number;
+    return known->second;
 }
 
 PrimitiveSet FaceErrors::primitives(std::uint32_t label) const {

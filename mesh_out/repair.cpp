@@ -21,16 +21,16 @@ double BoundedSurface::error_of(std::size_t face) const {
 namespace {
 
 constexpr int kRounds = 5;
-constexpr double kShortest = 0.4;  ///< of a spacing: what is split no more
-constexpr double kLeastTurn = 0.2; ///< cosine of how far a split may turn a face
+constexpr double kShortest = 0.4;   ///< of a spacing: what is split no more
+constexpr double kOnSurface = 1e-3; ///< of a spacing
+constexpr double kLeastTurn = 0.2;  ///< cosine of how far a split may turn a face
 
 class Repair {
 public:
-    explicit Repair(BoundedSurface& surface) : s_(surface), n_old_(surface.positions.size()) {
-        errors_.assign(s_.table.n_triangles(), 0);
-        dirty_.assign(errors_.size(), 1);
-    }
-    Repaired run(Progress* progress);
+    explicit Repair(BoundedSurface& surface)
+        : start_(surface), s_(surface), errors_(surface.face_errors), dirty_(surface.dirty),
+          n_old_(surface.positions.size()) {}
+    Repaired run(bool is_last, Progress* progress);
 
 private:
     void measure();
@@ -40,9 +40,11 @@ private:
     bool place(std::uint32_t corner, std::size_t face, Vec3& at, std::uint32_t& label) const;
     bool split_is_shapely(std::uint32_t corner, const Vec3& at) const;
     std::uint32_t longest(std::size_t face) const;
+    double error_there(std::size_t face, double enough_m) const;
     std::vector<UnresolvedPlace> places(const std::vector<std::uint8_t>& bad) const;
 
-    BoundedSurface& s_;
+    BoundedSurface& start_;
+    BoundedSurface s_;
     std::vector<double> errors_; ///< per face
     std::vector<std::uint8_t> dirty_;
     std::size_t n_old_;                   ///< vertices before any split
@@ -128,7 +130,7 @@ bool Repair::place(std::uint32_t corner, std::size_t face, Vec3& at, std::uint32
         return false;
     const auto lies_there = [&](std::uint32_t l, double reach) {
         const auto y = onto(s_.errors.field(), s_.errors.primitives(l), middle, reach);
-        if (!y || std::abs(s_.errors.field().at(*y).value_m) > 1e-3 * s_.spacing_m)
+        if (!y || std::abs(s_.errors.field().at(*y).value_m) > kOnSurface * s_.spacing_m)
             return false;
         at = *y;
         label = l;
@@ -192,7 +194,7 @@ bool Repair::split(std::size_t face) {
     return false;
 }
 
-Repaired Repair::run(Progress* progress) {
+Repaired Repair::run(bool is_last, Progress* progress) {
     Repaired repaired;
     BoundedMesh& out = repaired.result;
     out.bound_m = s_.bound_m;
@@ -206,6 +208,10 @@ Repaired Repair::run(Progress* progress) {
             bad[f] = meets[f] || !(errors_[f] <= s_.bound_m);
         // What crosses stays in question until it does no more.
         dirty_ = meets;
+        if (round == 0) {
+            start_.face_errors = errors_;
+            start_.dirty = dirty_;
+        }
         bool changed = false;
         for (std::size_t f = 0; round < kRounds && f < bad.size(); ++f)
             if (bad[f])
@@ -214,22 +220,41 @@ Repaired Repair::run(Progress* progress) {
             break;
     }
     for (std::size_t f = 0; f < errors_.size(); ++f) {
+        if (!meets[f])
+            continue;
+        const FaceErrors::Corners p = s_.corners(f);
+        const Vec3 middle = (p[0] + p[1] + p[2]) / 3;
+        repaired.crossings.push_back(
+            {middle,
+             std::max({length(p[0] - middle), length(p[1] - middle), length(p[2] - middle)})});
+    }
+    if (!is_last && !repaired.crossings.empty())
+        return repaired;
+    for (std::size_t f = 0; f < errors_.size(); ++f) {
         out.mesh.triangles.push_back(s_.table.triangle(f));
         if (!bad[f])
             out.error_m = std::max(out.error_m, errors_[f]);
-        if (meets[f]) {
-            const FaceErrors::Corners p = s_.corners(f);
-            const Vec3 middle = (p[0] + p[1] + p[2]) / 3;
-            repaired.crossings.push_back(
-                {middle,
-                 std::max({length(p[0] - middle), length(p[1] - middle), length(p[2] - middle)})});
-        }
     }
     out.unresolved = places(bad);
     out.mesh.positions = s_.positions;
     for (const std::uint32_t l : s_.labels)
         out.mesh.labels.push_back(s_.errors.primitives(l));
     return repaired;
+}
+
+/// An upper bound of the distance of a bad face; of its parts none below `enough_m` is told.
+double Repair::error_there(std::size_t face, double enough_m) const {
+    const FaceErrors::Corners corners = s_.corners(face);
+    double error = s_.errors.searched(corners, enough_m);
+    for (const std::uint32_t v : s_.table.triangle(face)) {
+        // At worst the surface is no farther than a vertex that lies on it.
+        const Vec3& y = s_.exact[v];
+        if (error < FaceErrors::kFar ||
+            std::abs(s_.errors.field().at(y).value_m) > kOnSurface * s_.spacing_m)
+            continue;
+        error = std::max({length(corners[0] - y), length(corners[1] - y), length(corners[2] - y)});
+    }
+    return error;
 }
 
 /// Bad faces that hang together are one place.
@@ -247,7 +272,7 @@ std::vector<UnresolvedPlace> Repair::places(const std::vector<std::uint8_t>& bad
         while (!open.empty()) {
             const std::size_t f = open.back();
             open.pop_back();
-            error = std::max(error, s_.errors.searched(s_.corners(f), 1.5 * s_.bound_m));
+            error = std::max(error, error_there(f, std::max(error, 1.5 * s_.bound_m)));
             for (const std::uint32_t v : s_.table.triangle(f)) {
                 box.include(s_.positions[v]);
                 std::uint32_t c = s_.table.corner(v);
@@ -267,8 +292,25 @@ std::vector<UnresolvedPlace> Repair::places(const std::vector<std::uint8_t>& bad
 
 } // namespace
 
-Repaired repair(BoundedSurface& surface, Progress* progress) {
-    return Repair(surface).run(progress);
+bool keep(BoundedSurface& s, const std::vector<std::uint8_t>& more) {
+    bool any = false;
+    for (std::uint32_t v = 0; v < more.size(); ++v) {
+        if (!more[v] || s.kept[v])
+            continue;
+        any = true;
+        s.kept[v] = 1;
+        s.positions[v] = s.exact[v];
+        std::uint32_t c = s.table.corner(v);
+        do {
+            s.dirty[c / 3] = 1;
+            c = s.table.swing(c);
+        } while (c != s.table.corner(v));
+    }
+    return any;
+}
+
+Repaired repair(BoundedSurface& surface, bool is_last, Progress* progress) {
+    return Repair(surface).run(is_last, progress);
 }
 
 } // namespace taihu

@@ -40,6 +40,23 @@ TEST(CornerTable, LinksEveryCornerOfACube) {
     expect_consistent(CornerTable(mesh.positions.size(), mesh.triangles, "here"));
 }
 
+TEST(CornerTable, RingsNameTheOtherVerticesOfTheirTriangles) {
+    const TriMesh mesh = cube();
+    const CornerTable table(mesh.positions.size(), mesh.triangles, "here");
+    for (std::uint32_t v = 0; v < table.n_vertices(); ++v) {
+        CornerTable::Ring ring;
+        ASSERT_TRUE(table.ring(v, ring));
+        std::size_t k = 0;
+        EXPECT_TRUE(ring.each([&](std::uint32_t p, std::uint32_t q) {
+            const std::uint32_t c = ring.corners[k++];
+            EXPECT_EQ(p, table.vertex(CornerTable::next(c)));
+            EXPECT_EQ(q, table.vertex(CornerTable::previous(c)));
+            return true;
+        }));
+        EXPECT_EQ(k, ring.n);
+    }
+}
+
 TEST(CornerTable, RefusesWhatIsNotAClosedManifold) {
     TriMesh open = cube();
     open.triangles.pop_back();
