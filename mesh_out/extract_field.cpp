@@ -96,8 +96,14 @@ public:
         constexpr int kMostRounds = 16;
         std::vector<std::uint8_t> picked = risky();
         std::vector<std::uint32_t> hit;
+        bool all_tested = false;
         for (int round = 0; round < kMostRounds; ++round) {
             hit = in_trouble(picked);
+            if (hit.empty() && !all_tested) { // those that are not risky cross others seldom
+                all_tested = true;
+                std::fill(picked.begin(), picked.end(), 1);
+                hit = in_trouble(picked);
+            }
             if (std::all_of(hit.begin(), hit.end(),
                             [&](std::uint32_t v) { return stage_[v] >= kLastStage; }))
                 break;
@@ -121,6 +127,8 @@ public:
 
 private:
     static constexpr std::uint8_t kOutside = 7, kLastStage = 9;
+    /// Vertices of two sheets; so that rounding does not bring them together.
+    static constexpr double kLeastApart_vox = 0.02;
 
     /// Triangles that may cross others: those with corners that left their cells or on edges within
     /// one primitive, and those round
@@ -337,11 +345,27 @@ private:
         };
         tbb::parallel_sort(order.begin(), order.end(),
                            [&](std::uint32_t a, std::uint32_t b) { return key(a) < key(b); });
+        const double least = kLeastApart_vox * points_.voxel_m();
         std::vector<std::uint32_t> hit;
-        for (std::size_t i = 1; i < order.size(); ++i)
-            if (mesh_.positions[order[i]] == mesh_.positions[order[i - 1]])
-                hit.insert(hit.end(), {order[i - 1], order[i]});
+        for (std::size_t i = 0; i < order.size(); ++i) {
+            const Vec3& p = mesh_.positions[order[i]];
+            for (std::size_t k = i + 1; k < order.size(); ++k) {
+                const Vec3& q = mesh_.positions[order[k]];
+                if (q.x - p.x > least)
+                    break;
+                if (p == q ||
+                    (length_squared(q - p) < least * least && !share_polygon(order[i], order[k])))
+                    hit.insert(hit.end(), {order[i], order[k]});
+            }
+        }
         return hit;
+    }
+    bool share_polygon(std::uint32_t v, std::uint32_t w) const {
+        const auto begin = around_.begin();
+        return std::any_of(begin + first_[v], begin + first_[v + 1], [&](std::uint32_t polygon) {
+            return std::find(begin + first_[w], begin + first_[w + 1], polygon) !=
+                   begin + first_[w + 1];
+        });
     }
 
     const CellBlocks& blocks_;

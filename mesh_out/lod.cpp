@@ -15,6 +15,7 @@
 #include "mesh_out/extract.h"
 #include "mesh_out/field_distance.h"
 #include "mesh_out/openness.h"
+#include "mesh_out/part_sheets_detail.h"
 #include "stats/core/error.h"
 #include "vdb_ops/placed_level_set_field.h"
 #include "vdb_ops/rasterize.h"
@@ -25,7 +26,7 @@ namespace {
 constexpr double kRoundingShare = 0.1;  ///< of a bound, for moving vertices onto the grid
 constexpr double kTightest = 0.9;       ///< by how much one more attempt may lower the inner bound
 constexpr double kMostBeyond = 0.01;    ///< share of samples over a bound that is held at all
-constexpr double kLeastMove = 1.0 / 64; ///< of what rounding may take, where faces would cross
+constexpr double kLeastMove = 1.0 / 16; ///< of what rounding may take, where faces would cross
 constexpr int kAttempts = 4, kMostLevels = 8, kMostBits = 18;
 constexpr int kReportVersion = 1;
 
@@ -85,8 +86,9 @@ private:
         std::vector<Vec3> beyond, crossings;
         std::size_t n_samples = 0;
     };
-    TriMesh snapped(const BoundedMesh& mesh, double bound_m, PositionGrid& grid) const;
-    Written written(const BoundedMesh& mesh, double bound_m) const;
+    TriMesh snapped(const BoundedMesh& mesh, double bound_m, double most_m,
+                    PositionGrid& grid) const;
+    Written written(const BoundedMesh& mesh, double bound_m, double move_m) const;
     std::vector<Sphere> around(const std::vector<Vec3>& points, double radius_m) const;
     bool within(double bound_m, LodLevel& level);
     bool of_triangles(std::size_t n, LodLevel& level, std::string& why);
@@ -140,17 +142,20 @@ BoundedSimplifier Chain::simplifier(double bound_m) {
 }
 
 /// On the coarsest position grid of the chain on which no faces cross that did not before.
-TriMesh Chain::snapped(const BoundedMesh& mesh, double bound_m, PositionGrid& grid) const {
+TriMesh Chain::snapped(const BoundedMesh& mesh, double bound_m, double most_m,
+                       PositionGrid& grid) const {
     const TriMesh plain{mesh.mesh.positions, mesh.mesh.triangles,
                         surface_normals(mesh.mesh, *probe_)};
-    for (double move_m = max_move_m(bound_m);; move_m /= 2) {
+    for (double move_m = most_m;; move_m /= 2) {
         check_cancelled(progress_);
         // Balanced vertices lie off the surface.
         grid =
             position_grid(box_.dilated(std::min(bound_m, box_.longest())), move_m, origin_step_m_);
-        const bool finest = grid.bits == kMostBits || move_m < kLeastMove * max_move_m(bound_m);
+        const bool finest = grid.bits == kMostBits || move_m < kLeastMove * most_m;
         try {
             TriMesh out = snap_to_grid(plain, grid).mesh;
+            if (finest)
+                part_sheets(out, grid, max_move_m(bound_m));
             if (finest || count_crossings(out.positions, out.triangles) <= mesh.n_crossings)
                 return out;
         } catch (const Error& e) { // vertices that find no place of their own
@@ -161,12 +166,12 @@ TriMesh Chain::snapped(const BoundedMesh& mesh, double bound_m, PositionGrid& gr
 }
 
 /// `mesh` as a file holds it: snapped, coded, decoded; certified and measured as decoded.
-Chain::Written Chain::written(const BoundedMesh& mesh, double bound_m) const {
+Chain::Written Chain::written(const BoundedMesh& mesh, double bound_m, double move_m) const {
     Written out;
     LodLevel& level = out.level;
     level.bound_m = bound_m;
     level.unresolved = mesh.unresolved;
-    TriMesh mesh_on_grid = snapped(mesh, bound_m, level.grid);
+    TriMesh mesh_on_grid = snapped(mesh, bound_m, move_m, level.grid);
     if (settings_.openness)
         mesh_on_grid.openness = openness(mesh_on_grid, {}, progress_);
     check_cancelled(progress_);
@@ -224,7 +229,7 @@ bool Chain::within(double bound_m, LodLevel& level) {
     std::vector<Sphere> kept;
     for (int attempt = 0;; ++attempt) {
         BoundedSimplifier next = start;
-        Written out = written(next.within(inner_m, kept, progress_), bound_m);
+        Written out = written(next.within(inner_m, kept, progress_), bound_m, max_move_m(bound_m));
         level = std::move(out.level);
         const bool last = attempt + 1 == kAttempts;
         const double share = double(out.beyond.size()) / double(out.n_samples);
@@ -263,7 +268,8 @@ bool Chain::of_triangles(std::size_t n, LodLevel& level, std::string& why) {
     }
     last_ = start.surface();
     const double bound_m = mesh.bound_m / (1 - kRoundingShare);
-    level = written(mesh, bound_m).level;
+    // Rounding may take some triangles more: not many.
+    level = written(mesh, bound_m, max_move_m(bound_m) / 4).level;
     level.bound_m = std::max(bound_m, level.error_m);
     return true;
 }

@@ -73,6 +73,16 @@ Vec3 mean_of(std::span<const Crossing> crossings) {
 }
 
 Crossing SurfacePoints::on_edge(const openvdb::Coord& at, int axis) const {
+    // Off the ends of the edge: where the surface passes a voxel all edges there would have one
+    // point, and so would cells that know nothing else.
+    constexpr double kOff = 0.03;
+    Crossing c = found_on_edge(at, axis);
+    const double start = voxel(at)[axis], h = lattice_.voxel_m;
+    c.point[axis] = std::clamp(c.point[axis], start + kOff * h, start + (1 - kOff) * h);
+    return c;
+}
+
+Crossing SurfacePoints::found_on_edge(const openvdb::Coord& at, int axis) const {
     openvdb::Coord next = at;
     ++next[axis];
     // Values of the grid to begin with: where a piece went or a bubble was filled the field never

@@ -56,6 +56,7 @@ public:
     bool joins(const std::array<openvdb::Coord, 4>& corners) const;
 
 private:
+    Crossing found_on_edge(const openvdb::Coord& voxel, int axis) const;
     /// The nearest point of one primitive, from near it: two steps; none where it is not that of
     /// the field.
     std::optional<Vec3> beside(Primitive primitive, const Vec3& p) const;

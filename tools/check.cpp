@@ -1,14 +1,18 @@
 // taihu check: the certificate of a file, from the file itself.
 #include "mesh_out/certificate.h"
 #include "mesh_out/extract.h"
+#include "mesh_out/field_distance.h"
 #include "mesh_out/surface_distance.h"
 #include "stats/core/error.h"
 #include "tools/solid_files.h"
+#include "vdb_ops/placed_level_set_field.h"
 #include "vdb_ops/rasterize.h"
 #include "vdb_ops/vdb_file.h"
 
 namespace taihu {
 namespace {
+
+constexpr double kFar = 1e300; ///< nothing is beyond
 
 struct CheckArgs {
     SolidOptions file;
@@ -19,6 +23,8 @@ struct CheckArgs {
 /// What distances are measured to.
 struct Reference {
     TriMesh mesh;
+    std::unique_ptr<const FieldProbe> probe = {}; ///< of a level set
+    Solid solid = {};
     double spacing_m = 0;                ///< of the samples
     std::optional<double> within_m = {}; ///< farther is a no
 };
@@ -31,7 +37,7 @@ MeshFile content(const SolidOptions& options, const Console& console) {
     return file;
 }
 
-/// The finest level of a mesh, or the uniform surface of a level set.
+/// The finest level of a mesh, or the surface of a level set.
 std::optional<Reference> reference(const CheckArgs& args, const Console& console) {
     constexpr double kSamples = 1000; // along the longest side of a mesh, which has no voxels
     if (args.against.empty()) {
@@ -43,10 +49,18 @@ std::optional<Reference> reference(const CheckArgs& args, const Console& console
     Reference to;
     Measure measure;
     if (is_vdb(args.against)) {
-        const auto grid = read_vdb(args.against).solid;
-        to.mesh = extract_uniform(*grid, console.progress);
-        measure = {lattice_of(*grid).voxel_m, bounds(to.mesh).longest()};
+        SolidOptions options;
+        options.path = args.against;
+        to.solid = read_solid(options, console, Surfaces::wanted);
+        if (!to.solid.field)
+            to.solid.field = std::make_shared<PlacedLevelSetField>(to.solid.grid);
+        const LabelledMesh sharp =
+            extract(*to.solid.grid, to.solid.field.get(), {}, console.progress);
+        to.mesh = {sharp.positions, sharp.triangles, {}};
+        measure = to.solid.measure;
         to.spacing_m = measure.voxel_m / 2;
+        const double reach_m = 8 * measure.voxel_m;
+        to.probe = to.solid.field->probe(bounds(to.mesh).dilated(reach_m), reach_m);
     } else {
         MeshFile file = read_mesh(args.against, args.file.mesh_settings(), console.progress);
         to.mesh = std::move(file.levels.front());
@@ -58,22 +72,33 @@ std::optional<Reference> reference(const CheckArgs& args, const Console& console
     return to;
 }
 
+FieldDistance as_field(const TwoSidedDistance& d) {
+    FieldDistance out;
+    out.max_m = d.max_m;
+    out.max_to_field_m = d.max_a_to_b_m;
+    out.max_from_field_m = d.max_b_to_a_m;
+    out.rms_m = d.rms_m;
+    out.n_samples = d.n_samples;
+    return out;
+}
+
 /// Farther than --within is a no.
 bool tell_distance(const TriMesh& level, const Reference& to, const std::string& where,
                    const std::filesystem::path& against, const Console& console,
                    nlohmann::ordered_json& json) {
     report_stage(console.progress, "measuring");
-    const TwoSidedDistance d = two_sided_distance(level, to.mesh, to.spacing_m);
+    const FieldDistance d = to.probe ? field_distance(level, *to.probe, to.mesh, to.spacing_m, kFar)
+                                     : as_field(two_sided_distance(level, to.mesh, to.spacing_m));
     const bool near = !to.within_m || d.max_m <= *to.within_m;
     json["distance"] = {{"against", against.string()},
                         {"max_m", d.max_m},
-                        {"max_to_reference_m", d.max_a_to_b_m},
-                        {"max_from_reference_m", d.max_b_to_a_m},
+                        {"max_to_reference_m", d.max_to_field_m},
+                        {"max_from_reference_m", d.max_from_field_m},
                         {"rms_m", d.rms_m},
                         {"samples", d.n_samples}};
     console.say("{}: {}{:.3g} m from {} at most ({:.3g} m there, {:.3g} m back), rms {:.3g} m",
-                where, near ? "" : "NO: ", d.max_m, against.string(), d.max_a_to_b_m,
-                d.max_b_to_a_m, d.rms_m);
+                where, near ? "" : "NO: ", d.max_m, against.string(), d.max_to_field_m,
+                d.max_from_field_m, d.rms_m);
     return near;
 }
 

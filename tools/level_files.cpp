@@ -150,7 +150,7 @@ void LevelFiles::check(const std::filesystem::path& input, const Console& consol
     }
     if (report.empty())
         report = (split ? out : out.parent_path()) / "report.json";
-    console.may_write(report, {input});
+    console.may_write(report, {input, out});
 }
 
 nlohmann::ordered_json write_levels(const LevelFiles& files, const openvdb::FloatGrid& grid,

@@ -297,7 +297,7 @@ std::string certificate_line(const Certificate& c) {
 
 void say_unresolved(const std::string& where, std::size_t n, double error_m,
                     const Console& console) {
-    if (n > 0)
+    if (n > 0 && error_m > 0)
         console.say("{}: but in {} place{} with walls or slits thinner than a voxel, {:.3g} m off "
                     "at most",
                     where, n, n == 1 ? "" : "s", error_m);

@@ -12,8 +12,6 @@
 #include "vdb_ops/columns_detail.h"
 #include "vdb_ops/kernels_detail.h"
 #include "vdb_ops/mesh_cells_detail.h"
-#include "vdb_ops/placed_level_set_field.h"
-#include "vdb_ops/rasterize.h"
 
 namespace taihu {
 namespace {
@@ -236,21 +234,6 @@ private:
 std::unique_ptr<LatticeField> MeshField::on(const Lattice& lattice,
                                             const openvdb::CoordBBox&) const {
     return std::make_unique<LatticeMesh>(mesh_, lattice);
-}
-
-std::shared_ptr<const Field> surface_field(std::shared_ptr<const Field> field,
-                                           openvdb::FloatGrid::ConstPtr grid) {
-    const auto* mesh = dynamic_cast<const MeshField*>(field.get());
-    if (!mesh)
-        return field;
-    constexpr double kLeastFace_vox2 = 16;
-    const double voxel_m = lattice_of(*grid).voxel_m;
-    const auto n_faces = static_cast<double>(mesh->mesh().triangles.size());
-    const bool coarse =
-        mesh->mesh().diagnosis.area_m2 > n_faces * kLeastFace_vox2 * voxel_m * voxel_m;
-    if (coarse && mesh->n_primitives() > 1)
-        return field;
-    return std::make_shared<PlacedLevelSetField>(std::move(grid));
 }
 
 } // namespace taihu

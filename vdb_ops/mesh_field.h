@@ -32,11 +32,4 @@ private:
     std::shared_ptr<Patches> patches_; ///< made when first asked for
 };
 
-/// What a surface is best made of: the level set of a mesh whose faces are a few voxels wide, or
-/// that has no sharp edges; it is as near to it, and sampled many times faster. Any other field
-/// itself.
-/// \param grid  the field rasterized.
-std::shared_ptr<const Field> surface_field(std::shared_ptr<const Field> field,
-                                           openvdb::FloatGrid::ConstPtr grid);
-
 } // namespace taihu

@@ -12,7 +12,6 @@
 #include "vdb_ops/csg_field.h"
 #include "vdb_ops/level_set_box.h"
 #include "vdb_ops/level_set_field.h"
-#include "vdb_ops/mesh_field.h"
 #include "vdb_ops/mesh_solid.h"
 #include "vdb_ops/offset_field.h"
 #include "vdb_ops/place.h"
@@ -20,6 +19,7 @@
 #include "vdb_ops/rasterize.h"
 #include "vdb_ops/solids_field.h"
 #include "vdb_ops/stored_field.h"
+#include "vdb_ops/surface_field.h"
 
 namespace taihu {
 namespace {
@@ -37,6 +37,14 @@ Box grown(const Box& box, double by_m) {
     out.include(box.lo - Vec3{by_m, by_m, by_m});
     out.include(box.hi + Vec3{by_m, by_m, by_m});
     return out;
+}
+
+/// For a scene that is sampled, surface_field() of it.
+std::shared_ptr<const Field> quick_field(const RecipeScene& scene,
+                                         std::shared_ptr<const Field> field) {
+    if (!scene.sampled || !is_slow(*field))
+        return field;
+    return surface_field(field, rasterize(*field, scene.lattice, scene.progress));
 }
 
 /// To build on: of a level set between its voxels where it has no other.
@@ -69,8 +77,9 @@ public:
         shape_box(settings_); // refuses settings out of range
     }
     Box box(const Similarity& at) const override { return placed(shape_box(settings_), at); }
-    std::shared_ptr<const Field> field(const RecipeScene&, const Similarity& at) const override {
-        return shape_field(settings_, at);
+    std::shared_ptr<const Field> field(const RecipeScene& scene,
+                                       const Similarity& at) const override {
+        return quick_field(scene, shape_field(settings_, at));
     }
 
 private:
@@ -104,7 +113,7 @@ public:
             mesh_solid(placed(mesh_, at), where_, close_, scene.lattice, scene.progress);
         for (const std::string& line : solid.diagnosis.lines(scene.lattice.voxel_m))
             scene.found.push_back(where_ + ": " + line);
-        return solid.field;
+        return quick_field(scene, solid.field);
     }
 
 private:
@@ -448,7 +457,11 @@ private:
 NodeSolid RecipeNode::solid(const RecipeScene& scene, const Similarity& at) const {
     const auto own = field(scene, at);
     const openvdb::FloatGrid::Ptr grid = rasterize(*own, scene.lattice, scene.progress);
-    return {grid, surface_field(own, grid)};
+    if (is_slow(*own))
+        return {grid, surface_field(own, grid)};
+    std::vector<std::string> unsaid; // it was said
+    std::vector<Sphere> uncounted;
+    return {grid, field({scene.lattice, unsaid, uncounted, scene.progress, true}, at)};
 }
 
 std::shared_ptr<const Field> RecipeNode::tile_field(const RecipeScene& scene,

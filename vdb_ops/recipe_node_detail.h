@@ -27,6 +27,7 @@ struct RecipeScene {
     std::vector<std::string>& found; ///< what was repaired, placed and removed
     std::vector<Sphere>& holes;      ///< that were carved
     Progress* progress = nullptr;
+    bool sampled = false; ///< shapes that cost much to ask by their level sets (surface_field())
 };
 
 /// A solid as a level set, and what its surface is made of: null where nothing but that says.

@@ -80,12 +80,15 @@ bool json_flag(const json& object, const std::string& where, const std::string& 
     return object[key].get<bool>();
 }
 
-/// Exactly one of: `levels` with `bound_m` and `factor`, `bounds_m`, `triangles`, `uniform`.
-std::optional<RecipeLod> lod_of(const json& recipe, const std::string& where, double scale) {
+/// Exactly one of: `levels` with `bound_m` or `bound_vox` and `factor`, `bounds_m`, `triangles`,
+/// `uniform`.
+std::optional<RecipeLod> lod_of(const json& recipe, const std::string& where, double scale,
+                                double voxel_m) {
     if (!recipe.contains("lod"))
         return std::nullopt;
-    static constexpr std::string_view kKeys[] = {"levels",    "bound_m", "factor",   "bounds_m",
-                                                 "triangles", "uniform", "openness", "origin"};
+    static constexpr std::string_view kKeys[] = {"levels",  "bound_m",  "bound_vox",
+                                                 "factor",  "bounds_m", "triangles",
+                                                 "uniform", "openness", "origin"};
     const std::string inside = where + ": lod";
     const json& own = recipe["lod"];
     check_keys(own, inside, {}, kKeys);
@@ -97,10 +100,12 @@ std::optional<RecipeLod> lod_of(const json& recipe, const std::string& where, do
                     inside + ": give 'levels', 'bounds_m', 'triangles' or 'uniform'");
     if (own.contains("levels")) {
         const double n = json_number(own, inside, "levels", 1, kMostLevels),
-                     bound_m = json_number(own, inside, "bound_m", 1e-9, 1e6),
+                     bound_m = own.contains("bound_vox")
+                                   ? json_number(own, inside, "bound_vox", 1e-3, 1e3) * voxel_m
+                                   : json_number(own, inside, "bound_m", 1e-9, 1e6) * scale,
                      factor = json_number(own, inside, "factor", 1.01, 100);
         for (int j = 0; j < static_cast<int>(n); ++j)
-            lod.bounds_m.push_back(scale * bound_m * std::pow(factor, j));
+            lod.bounds_m.push_back(bound_m * std::pow(factor, j));
     } else if (own.contains("bounds_m")) {
         lod.bounds_m = level_list<double>(own, inside, "bounds_m", 1e-9, 1e6, true);
         for (double& bound_m : lod.bounds_m)
@@ -191,7 +196,7 @@ struct ReadyRecipe {
         at = Similarity::scaling(scale);
         box = placed(own, at);
         made.voxel_m = voxel_of(text, where, settings, box, scale);
-        made.lod = lod_of(text, where, scale);
+        made.lod = lod_of(text, where, scale, made.voxel_m);
         lattice.voxel_m = made.voxel_m;
         if (const openvdb::FloatGrid* giver = root->lattice_giver()) {
             const Lattice given = lattice_of(*giver);

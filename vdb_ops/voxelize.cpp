@@ -5,9 +5,9 @@
 #include "stats/core/error.h"
 #include "stats/number_detail.h"
 #include "vdb_ops/estimate.h"
-#include "vdb_ops/mesh_field.h"
 #include "vdb_ops/mesh_solid.h"
 #include "vdb_ops/rasterize.h"
+#include "vdb_ops/surface_field.h"
 
 namespace taihu {
 namespace {

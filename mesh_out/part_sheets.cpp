@@ -1,0 +1,110 @@
+#include "mesh_out/part_sheets_detail.h"
+
+#include <algorithm>
+#include <cmath>
+#include <vector>
+
+#include "mesh_out/crossings_detail.h"
+#include "stats/core/box.h"
+
+namespace taihu {
+namespace {
+
+/// The faces of a vertex and those that they may meet.
+class Surroundings {
+public:
+    Surroundings(TriMesh& mesh, std::uint32_t vertex, double reach_m)
+        : mesh_(mesh), vertex_(vertex) {
+        Box around;
+        for (const Triangle& t : mesh.triangles)
+            if (has(t))
+                for (const std::uint32_t v : t)
+                    around.include(mesh.positions[v]);
+        around = around.dilated(reach_m);
+        for (const Triangle& t : mesh.triangles) {
+            Box box;
+            for (const std::uint32_t v : t)
+                box.include(mesh.positions[v]);
+            bool meets = true;
+            for (int axis = 0; axis < 3; ++axis)
+                meets = meets && box.lo[axis] <= around.hi[axis] && box.hi[axis] >= around.lo[axis];
+            if (meets) {
+                faces_.push_back(t);
+                own_.push_back(has(t));
+            }
+        }
+    }
+    /// Pairs that cross with the vertex at `p`; more than there can be where it must not be.
+    std::size_t n_crossings(const Vec3& p) const {
+        const Vec3 was = mesh_.positions[vertex_];
+        mesh_.positions[vertex_] = p;
+        std::size_t n = 0;
+        for (std::size_t f = 0; f < faces_.size(); ++f) {
+            const Triangle& t = faces_[f];
+            const auto is_there = [&](std::uint32_t v) {
+                return v != vertex_ && mesh_.positions[v] == p;
+            };
+            if (std::any_of(t.begin(), t.end(), is_there) ||
+                (own_[f] &&
+                 is_flat(mesh_.positions[t[0]], mesh_.positions[t[1]], mesh_.positions[t[2]])))
+                n = faces_.size() * faces_.size();
+        }
+        if (n == 0)
+            n = crossing_pairs(mesh_.positions, faces_, own_).size();
+        mesh_.positions[vertex_] = was;
+        return n;
+    }
+
+private:
+    bool has(const Triangle& t) const { return std::find(t.begin(), t.end(), vertex_) != t.end(); }
+
+    TriMesh& mesh_;
+    std::uint32_t vertex_;
+    std::vector<Triangle> faces_;
+    std::vector<std::uint8_t> own_;
+};
+
+void move_apart(TriMesh& mesh, std::uint32_t vertex, const PositionGrid& grid, double most_m) {
+    const Surroundings around(mesh, vertex, most_m);
+    const Vec3 from = mesh.positions[vertex];
+    const double widest = std::exp2(grid.bits) - 1;
+    std::size_t least = around.n_crossings(from);
+    Vec3 best = from;
+    for (double by = 1; least > 0 && by * grid.step_m <= most_m; by *= 2)
+        for (int k = 0; least > 0 && k < 27; ++k) {
+            const Vec3 to =
+                from + Vec3{double(k / 9 - 1), double(k / 3 % 3 - 1), double(k % 3 - 1)} *
+                           (by * grid.step_m);
+            const Vec3 at = (to - grid.origin) / grid.step_m;
+            if (std::min({at.x, at.y, at.z}) < 0 || std::max({at.x, at.y, at.z}) > widest)
+                continue;
+            if (const std::size_t n = around.n_crossings(to); n < least) {
+                least = n;
+                best = to;
+            }
+        }
+    mesh.positions[vertex] = best;
+}
+
+} // namespace
+
+void part_sheets(TriMesh& mesh, const PositionGrid& grid, double most_m) {
+    constexpr int kPasses = 4;
+    constexpr std::size_t kMostPairs = 2000; // more are no accident of rounding
+    for (int pass = 0; pass < kPasses; ++pass) {
+        const auto pairs = crossing_pairs(mesh.positions, mesh.triangles);
+        if (pairs.empty() || pairs.size() > kMostPairs)
+            return;
+        std::vector<std::uint32_t> vertices;
+        for (const auto& [f, g] : pairs)
+            for (const std::uint32_t face : {f, g})
+                vertices.insert(vertices.end(), mesh.triangles[face].begin(),
+                                mesh.triangles[face].end());
+        std::sort(vertices.begin(), vertices.end());
+        vertices.erase(std::unique(vertices.begin(), vertices.end()), vertices.end());
+        for (const std::uint32_t v : vertices)
+            move_apart(mesh, v, grid, most_m);
+    }
+}
+
+} // namespace taihu

@@ -1,0 +1,29 @@
+#include "vdb_ops/surface_field.h"
+
+#include "vdb_ops/mesh_field.h"
+#include "vdb_ops/placed_level_set_field.h"
+#include "vdb_ops/rasterize.h"
+#include "vdb_ops/superquadric_field.h"
+
+namespace taihu {
+
+bool is_slow(const Field& field) {
+    return dynamic_cast<const MeshField*>(&field) || dynamic_cast<const SuperquadricField*>(&field);
+}
+
+std::shared_ptr<const Field> surface_field(std::shared_ptr<const Field> field,
+                                           openvdb::FloatGrid::ConstPtr grid) {
+    if (!is_slow(*field))
+        return field;
+    if (const auto* mesh = dynamic_cast<const MeshField*>(field.get())) {
+        constexpr double kLeastFace_vox2 = 16;
+        const double voxel_m = lattice_of(*grid).voxel_m;
+        const auto n_faces = static_cast<double>(mesh->mesh().triangles.size());
+        const double area_vox2 = mesh->mesh().diagnosis.area_m2 / (voxel_m * voxel_m);
+        if (area_vox2 > n_faces * kLeastFace_vox2 && mesh->n_primitives() > 1)
+            return field;
+    }
+    return std::make_shared<PlacedLevelSetField>(std::move(grid));
+}
+
+} // namespace taihu
