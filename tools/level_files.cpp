@@ -139,9 +139,10 @@ void LevelFiles::check(const std::filesystem::path& input, const Console& consol
         if (out.has_extension())
             throw Error(Fault::bad_argument,
                         out.string() + ": --split writes a folder; name one without extension");
-        for (std::size_t j = 0; j < 8; ++j)
+        if (!std::filesystem::is_directory(out))
+            console.may_write(out, {input});
+        for (std::size_t j = 0; std::filesystem::is_directory(out) && j < 8; ++j)
             console.may_write(out / level_name(j), {input});
-        console.may_write(out / "manifest.json", {input});
     } else {
         if (mesh_format(out) != MeshFormat::glb)
             throw Error(Fault::unsupported, out.string() + ": levels go into a .glb; name one, or "
@@ -150,7 +151,8 @@ void LevelFiles::check(const std::filesystem::path& input, const Console& consol
     }
     if (report.empty())
         report = (split ? out : out.parent_path()) / "report.json";
-    console.may_write(report, {input, out});
+    if (report.parent_path() != out || std::filesystem::is_directory(out))
+        console.may_write(report, {input, out});
 }
 
 nlohmann::ordered_json write_levels(const LevelFiles& files, const openvdb::FloatGrid& grid,

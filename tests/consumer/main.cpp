@@ -13,7 +13,7 @@
 
 int main() {
     using namespace taihu;
-    const auto ball = shape_field({.kind = ShapeKind::sphere});
+    const std::shared_ptr<const Field> ball = shape_field({.kind = ShapeKind::sphere});
     const auto base = rasterize(*ball, {.voxel_m = 0.02});
     const auto holes = place_holes(Law::exponential(5), {.porosity = 0.2}, *base).holes;
     const auto rock = clean(*carve(*base, holes).rock).solid;

@@ -4,7 +4,8 @@
 import fs from 'node:fs';
 import { load } from './modules.mjs';
 
-const kComponents = { SCALAR: 1, VEC3: 3 };
+const kComponents = { SCALAR: 1, VEC3: 3, VEC4: 4 };
+const kByte = 5121, kFloat = 5126;
 
 function check(condition, message) {
   if (!condition) throw new Error(message);
@@ -29,7 +30,9 @@ function decodeAttribute(draco, decoder, mesh, id, accessor, label) {
   const attribute = decoder.GetAttributeByUniqueId(mesh, id);
   check(attribute.ptr !== 0, `${label}: no Draco attribute ${id}`);
   check(attribute.num_components() === kComponents[accessor.type], `${label}: another type`);
-  check(accessor.componentType === 5126, `${label}: not float`);
+  const isColour = label.endsWith(' COLOR_0');
+  check(isColour ? accessor.componentType === kByte && accessor.normalized
+    : accessor.componentType === kFloat, `${label}: not ${isColour ? 'bytes' : 'float'}`);
   check(accessor.count === mesh.num_points(),
     `${label}: count ${accessor.count}, decoded ${mesh.num_points()}`);
   const out = new draco.DracoFloat32Array();

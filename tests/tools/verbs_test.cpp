@@ -54,10 +54,14 @@ TEST(Verbs, FromMeasurementsToACertifiedRock) {
     EXPECT_TRUE(check["holds"].get<bool>());
     ASSERT_EQ(check["levels"].size(), 3u);
     EXPECT_EQ(check["levels"][0]["components"], 1);
-    // lod's own figure for the finest level, and every level farther off than the one before.
+    // Of lod's own figure for the finest level, or that of the places which it names apart; and
+    // every level farther off than the one before.
     const json far = result("taihu check rock.glb --against rock.vdb", scratch);
-    EXPECT_NEAR(far["levels"][0]["distance"]["max_m"].get<double>(),
-                chain["levels"][0]["error_m"].get<double>(), 1e-9);
+    const double far_m = far["levels"][0]["distance"]["max_m"],
+                 error_m = chain["levels"][0]["error_m"],
+                 apart_m = chain["levels"][0]["unresolved_error_m"];
+    EXPECT_GT(far_m, 0.9 * error_m);
+    EXPECT_LT(far_m, 1.1 * std::max(error_m, apart_m)); // samples of another surface
     EXPECT_GT(far["levels"][2]["distance"]["rms_m"], far["levels"][0]["distance"]["rms_m"]);
     const Finished no =
         run("taihu check rock.glb --against rock.vdb --within 0.6vox", scratch.path());
