@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <numbers>
 #include <string>
 
@@ -132,8 +133,12 @@ BoundedMesh BoundedSimplifier::level(double bound_m, std::span<const Sphere> kep
         // the input stays round them; it does not cross itself.
         const bool can_freeze = freeze < kMostFreezes;
         for (int trial = 0;; ++trial) {
-            Repaired repaired = repair(surface, !can_freeze && trial == kMostTries, progress);
-            if (repaired.crossings.empty() || (!can_freeze && trial == kMostTries))
+            const std::size_t most = !can_freeze && trial == kMostTries
+                                         ? std::numeric_limits<std::size_t>::max()
+                                     : trial > 0 ? settings_.few_crossings
+                                                 : 0;
+            Repaired repaired = repair(surface, most, progress);
+            if (repaired.crossings.size() <= most)
                 return std::move(repaired.result);
             crossings.insert(crossings.end(), repaired.crossings.begin(), repaired.crossings.end());
             const bool is_new =

@@ -13,8 +13,11 @@ namespace taihu {
 class CornerTable;
 
 struct BoundedSettings {
-    double spacing_m = 0;     ///< of the lattice that the mesh was made on [m], > 0
-    bool balance = true;      ///< move vertices off the surface so that errors fall on both sides
+    double spacing_m = 0; ///< of the lattice that the mesh was made on [m], > 0
+    bool balance = true;  ///< move vertices off the surface so that errors fall on both sides
+    /// So many faces may be left crossing others, where no more vertices may move; more, and all is
+    /// simplified again.
+    std::size_t few_crossings = 0;
     double max_turn_deg = 60; ///< between a new face and the field's normal, (0, 90]
 };
 

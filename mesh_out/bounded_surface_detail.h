@@ -46,7 +46,7 @@ struct Repaired {
     BoundedMesh result;
     std::vector<Sphere> crossings; ///< round faces that still meet others
 };
-/// \param is_last  without it there is no result where faces still meet.
-Repaired repair(BoundedSurface& surface, bool is_last, Progress* progress);
+/// \param most_crossings  where more faces still meet there is no result.
+Repaired repair(BoundedSurface& surface, std::size_t most_crossings, Progress* progress);
 
 } // namespace taihu

@@ -23,11 +23,13 @@
 namespace taihu {
 namespace {
 
-constexpr double kRoundingShare = 0.1;  ///< of a bound, for moving vertices onto the grid
-constexpr double kTightest = 0.9;       ///< by how much one more attempt may lower the inner bound
-constexpr double kMostBeyond = 0.01;    ///< share of samples over a bound that is held at all
-constexpr double kLeastMove = 1.0 / 16; ///< of what rounding may take, where faces would cross
-constexpr int kAttempts = 4, kMostLevels = 8, kMostBits = 18;
+constexpr double kRoundingShare = 0.1; ///< of a bound, for moving vertices onto the grid
+constexpr double kTightest = 0.9;      ///< by how much one more attempt may lower the inner bound
+constexpr double kFewBeyond = 2e-5;    ///< share of samples over a bound that are named, not mended
+constexpr std::size_t kFewCrossings = 40; ///< that are better parted than rounded less
+constexpr double kMostBeyond = 0.01;      ///< share of samples over a bound that is held at all
+constexpr double kLeastMove = 1.0 / 16;   ///< of what rounding may take, where faces would cross
+constexpr int kAttempts = 2, kMostLevels = 8, kMostBits = 18;
 constexpr int kReportVersion = 1;
 
 std::string shown(double value) {
@@ -116,7 +118,7 @@ Chain::Chain(const openvdb::FloatGrid& solid, const Field* field, const LodSetti
              Progress* progress)
     : settings_(settings), progress_(progress), voxel_m_(lattice_of(solid).voxel_m), field_(field) {
     report_stage(progress, "extracting the surface");
-    const double bound_vox = std::clamp(0.25 * finest_bound_m() / voxel_m_, 0.05, 0.5);
+    const double bound_vox = std::clamp(0.5 * finest_bound_m() / voxel_m_, 0.05, 0.5);
     last_ = extract(solid, field, {.bound_vox = bound_vox}, progress);
     reference_ = {last_.positions, last_.triangles, {}};
     box_ = bounds(reference_);
@@ -138,15 +140,16 @@ BoundedSimplifier Chain::simplifier(double bound_m) {
     };
     probe_ = probe(2 * (voxel_m_ + bound_m));
     around_ = probe(8 * (voxel_m_ + bound_m));
-    return {last_, *around_, BoundedSettings{.spacing_m = voxel_m_}};
+    return {last_, *around_,
+            BoundedSettings{.spacing_m = voxel_m_, .few_crossings = kFewCrossings}};
 }
 
-/// On the coarsest position grid of the chain on which no faces cross that did not before.
+/// On the coarsest position grid of the chain on which no faces cross.
 TriMesh Chain::snapped(const BoundedMesh& mesh, double bound_m, double most_m,
                        PositionGrid& grid) const {
     const TriMesh plain{mesh.mesh.positions, mesh.mesh.triangles,
                         surface_normals(mesh.mesh, *probe_)};
-    for (double move_m = most_m;; move_m /= 2) {
+    for (double move_m = most_m;; move_m /= 4) {
         check_cancelled(progress_);
         // Balanced vertices lie off the surface.
         grid =
@@ -154,9 +157,12 @@ TriMesh Chain::snapped(const BoundedMesh& mesh, double bound_m, double most_m,
         const bool finest = grid.bits == kMostBits || move_m < kLeastMove * most_m;
         try {
             TriMesh out = snap_to_grid(plain, grid).mesh;
-            if (finest)
-                part_sheets(out, grid, max_move_m(bound_m));
-            if (finest || count_crossings(out.positions, out.triangles) <= mesh.n_crossings)
+            std::size_t n = count_crossings(out.positions, out.triangles);
+            if (n > 0 && (finest || n <= kFewCrossings)) {
+                part_sheets(out, grid, 2 * max_move_m(bound_m));
+                n = count_crossings(out.positions, out.triangles);
+            }
+            if (finest || n == 0)
                 return out;
         } catch (const Error& e) { // vertices that find no place of their own
             if (finest || e.fault() != Fault::numeric)
@@ -193,10 +199,9 @@ Chain::Written Chain::written(const BoundedMesh& mesh, double bound_m, double mo
     std::vector<Sphere> apart;
     for (const UnresolvedPlace& place : mesh.unresolved)
         apart.push_back({place.center, place.radius_m + bound_m});
-    // Half a voxel is finer than the reference's own faces; a wide bound need not be known so well.
-    FieldDistance distance =
-        field_distance(decoded, *probe_, reference_, std::max(0.5 * voxel_m_, 0.5 * bound_m),
-                       bound_m, apart, progress_);
+    // Every face has a few samples; it was certified before it was rounded.
+    FieldDistance distance = field_distance(
+        decoded, *probe_, reference_, std::max(voxel_m_, 0.5 * bound_m), bound_m, apart, progress_);
     level.error_m = distance.max_m;
     level.rms_m = distance.rms_m;
     level.unresolved_error_m = distance.max_apart_m;
@@ -231,19 +236,19 @@ bool Chain::within(double bound_m, LodLevel& level) {
         BoundedSimplifier next = start;
         Written out = written(next.within(inner_m, kept, progress_), bound_m, max_move_m(bound_m));
         level = std::move(out.level);
-        const bool last = attempt + 1 == kAttempts;
         const double share = double(out.beyond.size()) / double(out.n_samples);
+        const bool last = attempt + 1 == kAttempts || share <= kFewBeyond;
         if (last && share <= kMostBeyond) {
             for (const Sphere& ball : around(out.beyond, 2 * voxel_m_))
                 level.unresolved.push_back({ball.center, ball.radius_m, level.error_m});
             level.unresolved_error_m = std::max(level.unresolved_error_m, level.error_m);
             level.error_m = std::min(level.error_m, bound_m);
         }
-        if (level.error_m <= bound_m && (last || out.crossings.empty())) {
+        if (level.error_m <= bound_m && (attempt + 1 == kAttempts || out.crossings.empty())) {
             last_ = next.surface();
             return true;
         }
-        if (last)
+        if (attempt + 1 == kAttempts)
             return false;
         if (share > kMostBeyond)
             inner_m *= std::max(kTightest, 0.97 * bound_m / level.error_m);

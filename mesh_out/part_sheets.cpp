@@ -13,8 +13,7 @@ namespace {
 /// The faces of a vertex and those that they may meet.
 class Surroundings {
 public:
-    Surroundings(TriMesh& mesh, std::uint32_t vertex, double reach_m)
-        : mesh_(mesh), vertex_(vertex) {
+    Surroundings(const TriMesh& mesh, std::uint32_t vertex, double reach_m) : vertex_(vertex) {
         Box around;
         for (const Triangle& t : mesh.triangles)
             if (has(t))
@@ -33,44 +32,61 @@ public:
                 own_.push_back(has(t));
             }
         }
+        renumber(mesh.positions);
     }
     /// Pairs that cross with the vertex at `p`; more than there can be where it must not be.
-    std::size_t n_crossings(const Vec3& p) const {
-        const Vec3 was = mesh_.positions[vertex_];
-        mesh_.positions[vertex_] = p;
+    std::size_t n_crossings(const Vec3& p) {
+        positions_[vertex_] = p;
         std::size_t n = 0;
         for (std::size_t f = 0; f < faces_.size(); ++f) {
             const Triangle& t = faces_[f];
             const auto is_there = [&](std::uint32_t v) {
-                return v != vertex_ && mesh_.positions[v] == p;
+                return v != vertex_ && positions_[v] == p;
             };
             if (std::any_of(t.begin(), t.end(), is_there) ||
-                (own_[f] &&
-                 is_flat(mesh_.positions[t[0]], mesh_.positions[t[1]], mesh_.positions[t[2]])))
+                (own_[f] && is_flat(positions_[t[0]], positions_[t[1]], positions_[t[2]])))
                 n = faces_.size() * faces_.size();
         }
         if (n == 0)
-            n = crossing_pairs(mesh_.positions, faces_, own_).size();
-        mesh_.positions[vertex_] = was;
+            n = crossing_pairs(positions_, faces_, own_).size();
         return n;
     }
 
 private:
     bool has(const Triangle& t) const { return std::find(t.begin(), t.end(), vertex_) != t.end(); }
 
-    TriMesh& mesh_;
+    /// Few vertices, so that a test costs what few faces do.
+    void renumber(const std::vector<Vec3>& positions) {
+        std::vector<std::uint32_t> used;
+        for (const Triangle& t : faces_)
+            used.insert(used.end(), t.begin(), t.end());
+        std::sort(used.begin(), used.end());
+        used.erase(std::unique(used.begin(), used.end()), used.end());
+        const auto number = [&](std::uint32_t v) {
+            return static_cast<std::uint32_t>(std::lower_bound(used.begin(), used.end(), v) -
+                                              used.begin());
+        };
+        for (Triangle& t : faces_)
+            for (std::uint32_t& v : t)
+                v = number(v);
+        vertex_ = number(vertex_);
+        for (const std::uint32_t v : used)
+            positions_.push_back(positions[v]);
+    }
+
     std::uint32_t vertex_;
+    std::vector<Vec3> positions_;
     std::vector<Triangle> faces_;
     std::vector<std::uint8_t> own_;
 };
 
 void move_apart(TriMesh& mesh, std::uint32_t vertex, const PositionGrid& grid, double most_m) {
-    const Surroundings around(mesh, vertex, most_m);
+    Surroundings around(mesh, vertex, most_m);
     const Vec3 from = mesh.positions[vertex];
     const double widest = std::exp2(grid.bits) - 1;
     std::size_t least = around.n_crossings(from);
     Vec3 best = from;
-    for (double by = 1; least > 0 && by * grid.step_m <= most_m; by *= 2)
+    for (double by = 1; least > 0 && by * grid.step_m <= most_m; by *= 4)
         for (int k = 0; least > 0 && k < 27; ++k) {
             const Vec3 to =
                 from + Vec3{double(k / 9 - 1), double(k / 3 % 3 - 1), double(k % 3 - 1)} *

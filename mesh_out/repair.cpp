@@ -30,7 +30,7 @@ public:
     explicit Repair(BoundedSurface& surface)
         : start_(surface), s_(surface), errors_(surface.face_errors), dirty_(surface.dirty),
           n_old_(surface.positions.size()) {}
-    Repaired run(bool is_last, Progress* progress);
+    Repaired run(std::size_t most_crossings, Progress* progress);
 
 private:
     void measure();
@@ -194,7 +194,7 @@ bool Repair::split(std::size_t face) {
     return false;
 }
 
-Repaired Repair::run(bool is_last, Progress* progress) {
+Repaired Repair::run(std::size_t most_crossings, Progress* progress) {
     Repaired repaired;
     BoundedMesh& out = repaired.result;
     out.bound_m = s_.bound_m;
@@ -228,7 +228,7 @@ Repaired Repair::run(bool is_last, Progress* progress) {
             {middle,
              std::max({length(p[0] - middle), length(p[1] - middle), length(p[2] - middle)})});
     }
-    if (!is_last && !repaired.crossings.empty())
+    if (repaired.crossings.size() > most_crossings)
         return repaired;
     for (std::size_t f = 0; f < errors_.size(); ++f) {
         out.mesh.triangles.push_back(s_.table.triangle(f));
@@ -309,8 +309,8 @@ bool keep(BoundedSurface& s, const std::vector<std::uint8_t>& more) {
     return any;
 }
 
-Repaired repair(BoundedSurface& surface, bool is_last, Progress* progress) {
-    return Repair(surface).run(is_last, progress);
+Repaired repair(BoundedSurface& surface, std::size_t most_crossings, Progress* progress) {
+    return Repair(surface).run(most_crossings, progress);
 }
 
 } // namespace taihu

@@ -1,6 +1,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <vector>
 
 #include "vdb_ops/level_set_field.h"
 #include "vdb_ops/level_set_probe_detail.h"
@@ -13,6 +14,7 @@ namespace {
 
 using openvdb::Coord;
 // Without a place in the tree's list of accessors, which costs more than a look-up saves.
+using Leaf = openvdb::FloatTree::LeafNodeType;
 using Accessor = openvdb::tree::ValueAccessor<const openvdb::FloatTree, false>;
 
 double mix(double a, double b, double t) {
@@ -23,7 +25,9 @@ double mix(double a, double b, double t) {
 class LevelSetProbe final : public FieldProbe {
 public:
     LevelSetProbe(openvdb::FloatGrid::ConstPtr grid, const Similarity& at)
-        : grid_(std::move(grid)), at_(at), back_(at.inverse()), own_(lattice_of(*grid_)) {}
+        : grid_(std::move(grid)), at_(at), back_(at.inverse()), own_(lattice_of(*grid_)) {
+        list_leaves();
+    }
 
     Nearest at(const Vec3& p) const override { return {sample(p).value_m, 0}; }
     Value of(Primitive, const Vec3& p) const override { return sample(p); }
@@ -37,11 +41,7 @@ private:
         for (int axis = 0; axis < 3; ++axis)
             c[axis] = static_cast<int>(std::floor(std::clamp(q[axis], -0x1p30, 0x1p30)));
         const double x = q.x - c.x(), y = q.y - c.y(), z = q.z - c.z();
-        const Accessor accessor(grid_->tree());
-        std::array<double, 8> v;
-        for (int k = 0; k < 8; ++k)
-            v[static_cast<std::size_t>(k)] =
-                static_cast<double>(accessor.getValue(c.offsetBy(k >> 2, k >> 1 & 1, k & 1)));
+        const std::array<double, 8> v = corners(c);
         const double v00 = mix(v[0], v[4], x), v01 = mix(v[1], v[5], x), v10 = mix(v[2], v[6], x),
                      v11 = mix(v[3], v[7], x);
         const double near = mix(v00, v10, y), far = mix(v01, v11, y);
@@ -51,9 +51,55 @@ private:
         return {mix(near, far, z) * at_.scale(), at_.direction(gradient / own_.voxel_m)};
     }
 
+    /// The values of the eight voxels from `c` on, z fastest.
+    std::array<double, 8> corners(const Coord& c) const {
+        std::array<double, 8> v;
+        if ((c.x() & 7) < 7 && (c.y() & 7) < 7 && (c.z() & 7) < 7 && leaves_box_.isInside(c)) {
+            if (const Leaf* leaf = leaves_[number(c)]) { // all in one leaf, as two in three are
+                const float* at = leaf->buffer().data() + Leaf::coordToOffset(c);
+                for (std::size_t k = 0; k < 8; ++k)
+                    v[k] = static_cast<double>(at[(k >> 2) * 64 + (k >> 1 & 1) * 8 + (k & 1)]);
+                return v;
+            }
+        }
+        const Accessor accessor(grid_->tree());
+        for (int k = 0; k < 8; ++k)
+            v[static_cast<std::size_t>(k)] =
+                static_cast<double>(accessor.getValue(c.offsetBy(k >> 2, k >> 1 & 1, k & 1)));
+        return v;
+    }
+    std::size_t number(const Coord& c) const {
+        const Coord at = (c - leaves_box_.min());
+        return (static_cast<std::size_t>(at.x() >> 3) * n_leaves_[1] +
+                static_cast<std::size_t>(at.y() >> 3)) *
+                   n_leaves_[2] +
+               static_cast<std::size_t>(at.z() >> 3);
+    }
+    void list_leaves() {
+        constexpr std::size_t kMostLeaves = std::size_t{1} << 24;
+        openvdb::CoordBBox box;
+        if (!grid_->tree().evalLeafBoundingBox(box))
+            return;
+        std::size_t n = 1;
+        for (int axis = 0; axis < 3; ++axis) {
+            n_leaves_[static_cast<std::size_t>(axis)] =
+                static_cast<std::size_t>(box.dim()[axis] >> 3);
+            n *= n_leaves_[static_cast<std::size_t>(axis)];
+        }
+        if (n > kMostLeaves) // then by the tree
+            return;
+        leaves_box_ = box;
+        leaves_.assign(n, nullptr);
+        for (auto leaf = grid_->tree().cbeginLeaf(); leaf; ++leaf)
+            leaves_[number(leaf->origin())] = leaf.getLeaf();
+    }
+
     openvdb::FloatGrid::ConstPtr grid_;
     Similarity at_, back_;
     Lattice own_;
+    openvdb::CoordBBox leaves_box_; ///< whole leaves; empty where they are not listed
+    std::array<std::size_t, 3> n_leaves_{};
+    std::vector<const Leaf*> leaves_; ///< of each place in the box, or null
 };
 
 } // namespace
@@ -70,7 +116,8 @@ std::unique_ptr<FieldProbe> PlacedLevelSetField::probe(const Box&, double reach_
     const Lattice own = lattice_of(*grid_);
     // The eight voxels around a point are within sqrt(3) of it.
     constexpr double kWidest_vox = 16;
-    const double half_width = std::min(reach_m / at_.scale() / own.voxel_m + 1.74, kWidest_vox);
+    const double half_width =
+        std::min(0.5 * reach_m / at_.scale() / own.voxel_m + 1.74, kWidest_vox);
     auto grid = half_width > static_cast<double>(own.half_width_vox)
                     ? widen_band(*grid_, static_cast<float>(half_width))
                     : grid_;
