@@ -18,6 +18,7 @@ constexpr int kMostHalvings = 2;
 constexpr double kSmallest = 0.2; ///< of a spacing: parts of faces are not divided further
 constexpr double kStep = 1.6;     ///< spacings from sample to sample
 constexpr double kFineStep = 0.5; ///< where a primitive turns out to have creases
+constexpr double kFlat = 1e-6;    ///< slope of a value that is held to a band
 constexpr double kSteep = 0.95;   ///< gradients of distances have length 1
 constexpr double kSmooth = 2.85;  ///< length of the sum of three gradients of 1 that differ little
 constexpr double kPlanarMargin = 1.1; ///< rims of other surfaces are bent; planes are not
@@ -200,6 +201,8 @@ FaceErrors::Range FaceErrors::range(std::uint32_t shape, const Corners& f,
 double FaceErrors::sample(Primitive primitive, const Vec3& p, Range& range) const {
     const FieldProbe::Value at = field_.of(primitive, p);
     const double slope = length(at.gradient);
+    if (slope < kFlat) // beyond what the field tells: at least so far
+        return at.value_m;
     range.gradient += at.gradient;
     range.least_slope = std::min(range.least_slope, slope);
     if (slope > kSteep)

@@ -116,8 +116,7 @@ std::unique_ptr<FieldProbe> PlacedLevelSetField::probe(const Box&, double reach_
     const Lattice own = lattice_of(*grid_);
     // The eight voxels around a point are within sqrt(3) of it.
     constexpr double kWidest_vox = 16;
-    const double half_width =
-        std::min(0.5 * reach_m / at_.scale() / own.voxel_m + 1.74, kWidest_vox);
+    const double half_width = std::min(reach_m / at_.scale() / own.voxel_m + 1.74, kWidest_vox);
     auto grid = half_width > static_cast<double>(own.half_width_vox)
                     ? widen_band(*grid_, static_cast<float>(half_width))
                     : grid_;

@@ -25,8 +25,7 @@ public:
     std::unique_ptr<LatticeField> on(const Lattice& lattice,
                                      const openvdb::CoordBBox& region) const override;
     Primitive n_primitives() const override { return 1; }
-    /// Tells distances up to half the reach, and 14 of the grid's voxels at most: wider bands cost
-    /// more than they help.
+    /// Tells distances up to 14 of the grid's voxels at most.
     std::unique_ptr<FieldProbe> probe(const Box& region_m, double reach_m) const override;
 
 private:
