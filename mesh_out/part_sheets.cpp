@@ -24,15 +24,14 @@ public:
             Box box;
             for (const std::uint32_t v : t)
                 box.include(mesh.positions[v]);
-            bool meets = true;
-            for (int axis = 0; axis < 3; ++axis)
-                meets = meets && box.lo[axis] <= around.hi[axis] && box.hi[axis] >= around.lo[axis];
-            if (meets) {
+            if (meet(box, around)) {
                 faces_.push_back(t);
                 own_.push_back(has(t));
             }
         }
         renumber(mesh.positions);
+        for (std::size_t f = 0; f < faces_.size(); ++f)
+            boxes_.push_back(box_of(f));
     }
     /// Pairs that cross with the vertex at `p`; more than there can be where it must not be.
     std::size_t n_crossings(const Vec3& p) {
@@ -47,8 +46,15 @@ public:
                 (own_[f] && is_flat(positions_[t[0]], positions_[t[1]], positions_[t[2]])))
                 n = faces_.size() * faces_.size();
         }
-        if (n == 0)
-            n = crossing_pairs(positions_, faces_, own_).size();
+        for (std::size_t f = 0; n == 0 && f < faces_.size(); ++f)
+            if (own_[f])
+                boxes_[f] = box_of(f);
+        if (n > 0)
+            return n;
+        for (std::size_t f = 0; f < faces_.size(); ++f)
+            for (std::size_t g = 0; own_[f] && g < faces_.size(); ++g)
+                n += g != f && !(own_[g] && g < f) && meet(boxes_[f], boxes_[g]) &&
+                     faces_cross(positions_, faces_[f], faces_[g]);
         return n;
     }
 
@@ -74,10 +80,24 @@ private:
             positions_.push_back(positions[v]);
     }
 
+    Box box_of(std::size_t f) const {
+        Box box;
+        for (const std::uint32_t v : faces_[f])
+            box.include(positions_[v]);
+        return box;
+    }
+    static bool meet(const Box& a, const Box& b) {
+        for (int axis = 0; axis < 3; ++axis)
+            if (a.lo[axis] > b.hi[axis] || a.hi[axis] < b.lo[axis])
+                return false;
+        return true;
+    }
+
     std::uint32_t vertex_;
     std::vector<Vec3> positions_;
     std::vector<Triangle> faces_;
     std::vector<std::uint8_t> own_;
+    std::vector<Box> boxes_;
 };
 
 void move_apart(TriMesh& mesh, std::uint32_t vertex, const PositionGrid& grid, double most_m) {

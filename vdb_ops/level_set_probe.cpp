@@ -78,7 +78,10 @@ private:
     void list_leaves() {
         constexpr std::size_t kMostLeaves = std::size_t{1} << 24;
         openvdb::CoordBBox box;
-        if (!grid_->tree().evalLeafBoundingBox(box))
+        // Not evalLeafBoundingBox(), which passes over leaves without active voxels.
+        for (auto leaf = grid_->tree().cbeginLeaf(); leaf; ++leaf)
+            box.expand(leaf->getNodeBoundingBox());
+        if (box.empty())
             return;
         std::size_t n = 1;
         for (int axis = 0; axis < 3; ++axis) {
