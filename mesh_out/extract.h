@@ -31,7 +31,7 @@ struct ExtractSettings {
 /// \param solid  level set: cubic voxels, negative inside, half band >= 2 voxels.
 /// \param field  what it was made of; null: the level set is its own.
 /// \throws Error bad_argument: not a level set, nothing inside it, a setting out of range; numeric:
-/// the surface leaves the narrow band (a clipped grid), or triangles that cross are left;
+/// the surface leaves the narrow band (a clipped grid);
 /// unsupported: 2^32 vertices; cancelled: between blocks.
 LabelledMesh extract(const openvdb::FloatGrid& solid, const Field* field,
                      const ExtractSettings& settings = {}, Progress* progress = nullptr);

@@ -149,12 +149,13 @@ TriMesh Chain::snapped(const BoundedMesh& mesh, double bound_m, double most_m,
                        PositionGrid& grid) const {
     const TriMesh plain{mesh.mesh.positions, mesh.mesh.triangles,
                         surface_normals(mesh.mesh, *probe_)};
+    const Box box = box_.dilated(std::min(bound_m, box_.longest())); // balanced vertices lie off
+    const double least_m =
+        std::max(kLeastMove * most_m, 1.001 * finest_grid(box).step_m * std::sqrt(3.0) / 2);
     for (double move_m = most_m;; move_m /= 4) {
         check_cancelled(progress_);
-        // Balanced vertices lie off the surface.
-        grid =
-            position_grid(box_.dilated(std::min(bound_m, box_.longest())), move_m, origin_step_m_);
-        const bool finest = grid.bits == kMostBits || move_m < kLeastMove * most_m;
+        grid = position_grid(box, std::max(move_m, std::min(least_m, most_m)), origin_step_m_);
+        const bool finest = move_m <= least_m || grid.bits == kMostBits;
         try {
             TriMesh out = snap_to_grid(plain, grid).mesh;
             std::size_t n = count_crossings(out.positions, out.triangles);
