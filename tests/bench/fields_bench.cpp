@@ -1,5 +1,7 @@
 // Many analytic solids, combinations and grid operations. Processor seconds, medians of three.
 #include <cmath>
+#include <fmt/format.h>
+
 #include <functional>
 
 #include "stats/core/rng.h"
