@@ -48,7 +48,7 @@ public:
     /// \param mesh  closed 2-manifold, its vertices on the primitives of their labels; those
     /// without
     ///   a label, or off their primitives, go first.
-    /// \param field  a probe of the whole mesh with a reach of 8 spacings and 8 of the largest
+    /// \param field  a probe of the whole mesh with a reach of 8 spacings and 5.5 of the largest
     ///   bound; must outlive this.
     /// \throws Error bad_argument: a setting out of range, positions that are not finite, not
     ///   one label set for each position, no closed 2-manifold.

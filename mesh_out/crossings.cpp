@@ -3,15 +3,19 @@
 #include <algorithm>
 #include <array>
 #include <bit>
+#include <cmath>
+#include <limits>
 #include <optional>
 #include <utility>
 #include <vector>
 
 #include <boost/multiprecision/cpp_int.hpp>
 #include <tbb/blocked_range.h>
+#include <tbb/combinable.h>
 #include <tbb/parallel_for.h>
-#include <tbb/parallel_invoke.h>
 #include <tbb/parallel_reduce.h>
+
+#include "mesh_out/face_tree_detail.h"
 
 namespace taihu {
 namespace {
@@ -212,124 +216,33 @@ std::size_t move_shared_first(Triangle& f, Triangle& g) {
     return n;
 }
 
-/// The faces in the order of a binary tree of boxes: node i has the children 2i + 1 and 2i + 2, and
-/// each halves its range of faces, so that neither ranges nor links are stored.
-class BoxTree {
-public:
-    struct Face {
-        Box box;
-        Triangle vertices{};
-        std::uint32_t index = 0; ///< in the order that they were given in
-    };
-
-    BoxTree(std::span<const Vec3> positions, std::span<const Triangle> faces)
-        : faces_(faces.size()) {
-        tbb::parallel_for(std::size_t{0}, faces.size(), [&](std::size_t i) {
-            faces_[i].vertices = faces[i];
-            faces_[i].index = static_cast<std::uint32_t>(i);
-            for (const std::uint32_t v : faces[i])
-                faces_[i].box.include(positions[v]);
-        });
-        while (faces_.size() >> depth_ > kLeafFaces)
-            ++depth_;
-        boxes_.resize((std::size_t{2} << depth_) - 1);
-        build(0, 0, faces_.size(), depth_);
-    }
-
-    std::span<const Face> faces() const { return faces_; }
-
-    /// Calls visit(i) for the faces from `first` on that lie in leaves whose box meets `box`.
-    template <class Visit>
-    void visit_from(std::size_t first, const Box& box, const Visit& visit) const {
-        descend(0, 0, faces_.size(), depth_, first, box, visit);
-    }
-
-    static bool overlap(const Box& a, const Box& b) {
-        return a.lo.x <= b.hi.x && b.lo.x <= a.hi.x && a.lo.y <= b.hi.y && b.lo.y <= a.hi.y &&
-               a.lo.z <= b.hi.z && b.lo.z <= a.hi.z;
-    }
-
-private:
-    static constexpr std::size_t kLeafFaces = 4;
-
-    void build(std::size_t node, std::size_t begin, std::size_t end, unsigned depth) {
-        if (depth == 0) {
-            for (std::size_t i = begin; i < end; ++i)
-                boxes_[node] = joined(boxes_[node], faces_[i].box);
-            return;
-        }
-        Box middles;
-        for (std::size_t i = begin; i < end; ++i)
-            middles.include(middle(faces_[i]));
-        const Vec3 size = middles.size();
-        const int axis = size.x >= size.y && size.x >= size.z ? 0 : size.y >= size.z ? 1 : 2;
-        const std::size_t half = begin + (end - begin) / 2;
-        const auto at = [&](std::size_t i) {
-            return faces_.begin() + static_cast<std::ptrdiff_t>(i);
-        };
-        std::nth_element(at(begin), at(half), at(end), [axis](const Face& a, const Face& b) {
-            return middle(a)[axis] < middle(b)[axis];
-        });
-        const auto left = [&] { build(2 * node + 1, begin, half, depth - 1); };
-        const auto right = [&] { build(2 * node + 2, half, end, depth - 1); };
-        if (end - begin > 4096) {
-            tbb::parallel_invoke(left, right);
-        } else {
-            left();
-            right();
-        }
-        boxes_[node] = joined(boxes_[2 * node + 1], boxes_[2 * node + 2]);
-    }
-
-    template <class Visit>
-    void descend(std::size_t node, std::size_t begin, std::size_t end, unsigned depth,
-                 std::size_t first, const Box& box, const Visit& visit) const {
-        if (end <= first || !overlap(boxes_[node], box))
-            return;
-        if (depth == 0) {
-            for (std::size_t i = std::max(begin, first); i < end; ++i)
-                visit(i);
-            return;
-        }
-        const std::size_t half = begin + (end - begin) / 2;
-        descend(2 * node + 1, begin, half, depth - 1, first, box, visit);
-        descend(2 * node + 2, half, end, depth - 1, first, box, visit);
-    }
-
-    // Halved before they are added, or huge ones would overflow.
-    static Vec3 middle(const Face& f) { return f.box.lo * 0.5 + f.box.hi * 0.5; }
-    static Box joined(const Box& a, const Box& b) { return {min(a.lo, b.lo), max(a.hi, b.hi)}; }
-
-    std::vector<Face> faces_;
-    std::vector<Box> boxes_;
-    unsigned depth_ = 0;
-};
-
-/// Which parts of space some boxes reach into: a quick no for most others.
+/// Which parts of space some faces reach into: a quick no for most others.
 class Occupied {
 public:
-    explicit Occupied(std::span<const BoxTree::Face> faces) : bits_(kSide * kSide * kSide / 64) {
-        for (const BoxTree::Face& f : faces) {
-            all_.include(f.box.lo);
-            all_.include(f.box.hi);
-        }
+    Occupied(std::span<const Vec3> positions, std::span<const Triangle> faces, const Box& all)
+        : bits_(kSide * kSide * kSide / 64), all_(all) {
         const Vec3 size = all_.size();
         for (int axis = 0; axis < 3; ++axis)
             // Zero where the whole is flat, or so large that it overflows: then all is in one part.
             per_m_[axis] = size[axis] > 0 && size[axis] < 1e300 ? (kSide - 0.5) / size[axis] : 0;
-        for (const BoxTree::Face& f : faces)
-            each_part(f.box, [&](std::size_t i) {
+        for (const Triangle& f : faces)
+            each_part(box_of(positions, f), [&](std::size_t i) {
                 bits_[i / 64] |= std::uint64_t{1} << (i % 64);
                 return false;
             });
     }
     bool meets(const Box& box) const {
-        return BoxTree::overlap(box, all_) &&
+        return overlap(box, all_) &&
                each_part(box, [&](std::size_t i) { return (bits_[i / 64] >> (i % 64) & 1) != 0; });
     }
 
 private:
     static constexpr std::size_t kSide = 128;
+
+    static bool overlap(const Box& a, const Box& b) {
+        return a.lo.x <= b.hi.x && b.lo.x <= a.hi.x && a.lo.y <= b.hi.y && b.lo.y <= a.hi.y &&
+               a.lo.z <= b.hi.z && b.lo.z <= a.hi.z;
+    }
 
     /// Whether fn(part) is true for one of them.
     template <class Fn>
@@ -355,6 +268,28 @@ private:
     Box all_;
     Vec3 per_m_;
 };
+
+/// Whether a plane between two triangles, with their first corner in common or none, surely parts
+/// them: told by rounded numbers with a margin.
+bool surely_apart(const Corners& a, const Corners& b, bool is_shared) {
+    const Vec3& o = a[0];
+    const std::size_t first = is_shared ? 1 : 0;
+    Vec3 n;
+    double largest = 0, a_least = std::numeric_limits<double>::infinity(), b_most = -a_least;
+    for (std::size_t k = first; k < 3; ++k) {
+        const Vec3 p = a[k] - o, q = b[k] - o;
+        n += p - q;
+        largest = std::max({largest, std::abs(p.x), std::abs(p.y), std::abs(p.z), std::abs(q.x),
+                            std::abs(q.y), std::abs(q.z)});
+    }
+    for (std::size_t k = first; k < 3; ++k) {
+        a_least = std::min(a_least, dot(a[k] - o, n));
+        b_most = std::max(b_most, dot(b[k] - o, n));
+    }
+    const double margin =
+        0x1p-48 * (std::abs(n.x) + std::abs(n.y) + std::abs(n.z)) * largest + kUnderflowSlack;
+    return is_shared ? a_least > margin && b_most < -margin : a_least - b_most > margin;
+}
 
 } // namespace
 
@@ -386,6 +321,8 @@ bool faces_cross(std::span<const Vec3> positions, Triangle f, Triangle g) {
         return true;
     if (n_shared == 2)
         return folded(a[0], a[1], a[2], b[2]);
+    if (surely_apart(a, b, n_shared == 1))
+        return false;
     // When the free vertices of one face lie strictly on one side of the other's plane, the two
     // meet at most in the vertex they share.
     const auto sides = [n_shared](const Corners& plane, const Corners& points) {
@@ -417,16 +354,13 @@ bool faces_cross(std::span<const Vec3> positions, Triangle f, Triangle g) {
 std::size_t count_crossings(std::span<const Vec3> positions, std::span<const Triangle> faces) {
     if (faces.empty())
         return 0;
-    const BoxTree tree(positions, faces);
-    const std::span<const BoxTree::Face> sorted = tree.faces();
+    const FaceTree tree(positions, faces);
     return tbb::parallel_reduce(
-        tbb::blocked_range<std::size_t>(0, sorted.size(), 256), std::size_t{0},
+        tbb::blocked_range<std::size_t>(0, tree.n_groups(), 64), std::size_t{0},
         [&](const tbb::blocked_range<std::size_t>& range, std::size_t n) {
-            for (std::size_t i = range.begin(); i < range.end(); ++i)
-                tree.visit_from(i + 1, sorted[i].box, [&](std::size_t k) {
-                    if (BoxTree::overlap(sorted[i].box, sorted[k].box) &&
-                        faces_cross(positions, sorted[i].vertices, sorted[k].vertices))
-                        ++n;
+            for (std::size_t g = range.begin(); g < range.end(); ++g)
+                tree.visit_pairs(g, [&](const FaceTree::Face& f, const FaceTree::Face& other) {
+                    n += faces_cross(positions, f.vertices, other.vertices);
                 });
             return n;
         },
@@ -451,32 +385,35 @@ crossing_pairs(std::span<const Vec3> positions, std::span<const Triangle> faces,
     Pairs pairs;
     if (some.empty())
         return pairs;
-    const BoxTree tree(positions, some);
-    const Occupied occupied(tree.faces());
-    constexpr std::size_t kChunk = 4096;
-    std::vector<Pairs> found(faces.size() / kChunk + 1);
-    tbb::parallel_for(std::size_t{0}, found.size(), [&](std::size_t chunk) {
-        const std::size_t end = std::min(faces.size(), (chunk + 1) * kChunk);
-        for (std::size_t i = chunk * kChunk; i < end; ++i) {
-            Box box;
-            for (const std::uint32_t v : faces[i])
-                box.include(positions[v]);
-            if (!occupied.meets(box))
-                continue;
-            tree.visit_from(0, box, [&](std::size_t k) {
-                const BoxTree::Face& other = tree.faces()[k];
-                const std::uint32_t n = number[other.index];
-                const auto own = static_cast<std::uint32_t>(i);
-                if (n == own || (is_picked(i) && n < own) || !BoxTree::overlap(box, other.box) ||
-                    !has_area(i))
-                    return;
-                if (faces_cross(positions, faces[i], other.vertices))
-                    found[chunk].push_back(std::minmax(own, n));
+    const FaceTree tree(positions, some);
+    tbb::combinable<Pairs> found;
+    tbb::parallel_for(tbb::blocked_range<std::size_t>(0, tree.n_groups(), 64), [&](const auto& r) {
+        Pairs& own = found.local();
+        for (std::size_t g = r.begin(); g < r.end(); ++g)
+            tree.visit_pairs(g, [&](const FaceTree::Face& f, const FaceTree::Face& other) {
+                if (faces_cross(positions, f.vertices, other.vertices))
+                    own.push_back(std::minmax(number[f.index], number[other.index]));
             });
-        }
     });
-    for (const auto& part : found)
-        pairs.insert(pairs.end(), part.begin(), part.end());
+    if (!picked.empty()) {
+        const Occupied occupied(positions, some, tree.bounds());
+        tbb::parallel_for(tbb::blocked_range<std::size_t>(0, faces.size(), 1024),
+                          [&](const auto& r) {
+                              Pairs& own = found.local();
+                              for (std::size_t i = r.begin(); i < r.end(); ++i) {
+                                  const Box box = box_of(positions, faces[i]);
+                                  if (is_picked(i) || !occupied.meets(box) || !has_area(i))
+                                      continue;
+                                  tree.visit(tree.box(box), [&](const FaceTree::Face& other) {
+                                      if (faces_cross(positions, faces[i], other.vertices))
+                                          own.push_back(std::minmax(static_cast<std::uint32_t>(i),
+                                                                    number[other.index]));
+                                  });
+                              }
+                          });
+    }
+    found.combine_each(
+        [&](const Pairs& part) { pairs.insert(pairs.end(), part.begin(), part.end()); });
     std::sort(pairs.begin(), pairs.end());
     return pairs;
 }

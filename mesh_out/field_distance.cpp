@@ -1,6 +1,7 @@
 #include "mesh_out/field_distance.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <optional>
 #include <string>
@@ -8,6 +9,7 @@
 
 #include <tbb/blocked_range.h>
 #include <tbb/parallel_for.h>
+#include <tbb/parallel_sort.h>
 
 #include "mesh_out/surface_distance.h"
 #include "stats/core/error.h"
@@ -22,7 +24,7 @@ constexpr int kFinest = 64;         ///< parts of an edge
 
 /// The nearest point of the surface that can be reached by projecting onto the primitive that
 /// decides at `p`, then onto all that turn out to decide where that leads.
-std::optional<double> reached(const FieldProbe& field, const Vec3& p, double spacing_m) {
+std::optional<Vec3> surface_point(const FieldProbe& field, const Vec3& p, double spacing_m) {
     const auto here = field.at(p);
     PrimitiveSet set(here.primitive);
     for (std::size_t i = 0; i < PrimitiveSet::kMost; ++i) {
@@ -31,7 +33,7 @@ std::optional<double> reached(const FieldProbe& field, const Vec3& p, double spa
             return std::nullopt;
         const auto there = field.at(*q);
         if (std::fabs(there.value_m) < kOn * spacing_m)
-            return length(*q - p);
+            return q;
         if (!set.add(there.primitive))
             return std::nullopt;
     }
@@ -88,16 +90,31 @@ Sum summed(std::size_t n, Progress* progress, One&& one) {
     return all;
 }
 
-/// fn(p) on the corners of a face and between them, no two neighbours farther apart than the
-/// spacing.
+/// Each edge once, however many faces it has, ascending.
+std::vector<std::array<std::uint32_t, 2>> edges_of(const TriMesh& mesh) {
+    std::vector<std::array<std::uint32_t, 2>> edges;
+    edges.reserve(3 * mesh.triangles.size());
+    for (const Triangle& t : mesh.triangles)
+        for (std::size_t k = 0; k < 3; ++k) {
+            const auto [a, b] = std::minmax(t[k], t[(k + 1) % 3]);
+            edges.push_back({a, b});
+        }
+    tbb::parallel_sort(edges.begin(), edges.end());
+    edges.erase(std::unique(edges.begin(), edges.end()), edges.end());
+    return edges;
+}
+
+int n_parts(double length_m, double spacing_m) {
+    return static_cast<int>(std::clamp(std::ceil(length_m / spacing_m), 2.0, double{kFinest}));
+}
+
+/// fn(p) between the edges of a face, no two neighbours farther apart than the spacing.
 template <class Fn>
-void each_sample(const TriMesh& mesh, std::size_t face, double spacing_m, Fn&& fn) {
-    const Triangle& t = mesh.triangles[face];
-    const Vec3 &a = mesh.positions[t[0]], &b = mesh.positions[t[1]], &c = mesh.positions[t[2]];
-    const double edge = std::max({length(b - a), length(c - b), length(a - c)});
-    const int n = static_cast<int>(std::clamp(std::ceil(edge / spacing_m), 2.0, double{kFinest}));
-    for (int u = 0; u <= n; ++u)
-        for (int v = 0; u + v <= n; ++v) {
+void each_inside(const std::array<Vec3, 3>& face, double spacing_m, Fn&& fn) {
+    const auto& [a, b, c] = face;
+    const int n = n_parts(std::max({length(b - a), length(c - b), length(a - c)}), spacing_m);
+    for (int u = 1; u < n; ++u)
+        for (int v = 1; u + v < n; ++v) {
             const double x = double(u) / n, y = double(v) / n;
             fn(a * (1 - x - y) + b * x + c * y);
         }
@@ -115,12 +132,34 @@ FieldDistance field_distance(const TriMesh& mesh, const FieldProbe& field, const
                                              std::to_string(spacing_m) +
                                              ", must be at least 1e-5 of the mesh");
     const SurfaceDistance to_surface(surface), to_mesh(mesh);
-    const Sum there = summed(mesh.triangles.size(), progress, [&](std::size_t f, Sum& sum) {
-        each_sample(mesh, f, spacing_m, [&](const Vec3& p) {
-            const auto d = reached(field, p, spacing_m);
-            sum.add(p, d ? *d : to_surface(p), limit_m, apart);
-        });
+    const auto add = [&](const Vec3& p, Sum& sum) {
+        auto on = surface_point(field, p, spacing_m);
+        if (!on) { // went astray, as it does not from beside the surface
+            const Vec3 beside = to_surface.nearest(p);
+            on = surface_point(field, beside, spacing_m).value_or(beside);
+        }
+        sum.add(p, length(p - *on), limit_m, apart);
+    };
+    const std::vector<Vec3>& points = mesh.positions;
+    const auto edges = edges_of(mesh);
+    std::vector<std::uint8_t> is_used(points.size());
+    for (const auto& [a, b] : edges)
+        is_used[a] = is_used[b] = 1;
+    Sum there = summed(points.size(), progress, [&](std::size_t v, Sum& sum) {
+        if (is_used[v])
+            add(points[v], sum);
     });
+    there.add(summed(edges.size(), progress, [&](std::size_t i, Sum& sum) {
+        const Vec3 a = points[edges[i][0]], along = points[edges[i][1]] - a;
+        const int n = n_parts(length(along), spacing_m);
+        for (int k = 1; k < n; ++k)
+            add(a + along * (double(k) / n), sum);
+    }));
+    there.add(summed(mesh.triangles.size(), progress, [&](std::size_t f, Sum& sum) {
+        const Triangle& t = mesh.triangles[f];
+        each_inside({points[t[0]], points[t[1]], points[t[2]]}, spacing_m,
+                    [&](const Vec3& p) { add(p, sum); });
+    }));
     const Sum back = summed(surface.positions.size(), progress, [&](std::size_t i, Sum& sum) {
         sum.add(surface.positions[i], to_mesh(surface.positions[i]), limit_m, apart);
     });

@@ -20,13 +20,14 @@ struct FieldDistance {
     std::vector<Vec3> beyond; ///< samples farther than the limit that are not kept apart
 };
 
-/// To the field: from vertices and a regular pattern on every face, so that no point of a face is
-/// farther than about `spacing_m` from one, to the nearest point of the primitives that are active
-/// there (never |value|, which is less than the distance beyond rims); where that leads nowhere, to
-/// `surface`. From the field: from the vertices of `surface`. Deterministic on any number of
-/// threads. \param surface  a fine mesh of the field whose vertices lie on it, as extract() makes.
-/// \param limit_m  see `beyond`. \param apart  samples within these balls count for max_apart_m
-/// alone. \throws Error bad_argument: an empty mesh, a spacing below 1e-5 of it; cancelled.
+/// To the field: from vertices and regular patterns on edges and faces, so that no point of a face
+/// is farther than about `spacing_m` from one, to the nearest point of the primitives that are
+/// active there (never |value|, which is less than the distance beyond rims); where that leads
+/// nowhere, to the one beside the nearest point of `surface`. From the field: from the vertices of
+/// `surface`. Deterministic on any number of threads. \param surface  a fine mesh of the field
+/// whose vertices lie on it, as extract() makes. \param limit_m  see `beyond`. \param apart samples
+/// within these balls count for max_apart_m alone. \throws Error bad_argument: an empty mesh, a
+/// spacing below 1e-5 of it; cancelled.
 FieldDistance field_distance(const TriMesh& mesh, const FieldProbe& field, const TriMesh& surface,
                              double spacing_m, double limit_m, std::span<const Sphere> apart = {},
                              Progress* progress = nullptr);

@@ -118,7 +118,7 @@ Chain::Chain(const openvdb::FloatGrid& solid, const Field* field, const LodSetti
              Progress* progress)
     : settings_(settings), progress_(progress), voxel_m_(lattice_of(solid).voxel_m), field_(field) {
     report_stage(progress, "extracting the surface");
-    const double bound_vox = std::clamp(0.5 * finest_bound_m() / voxel_m_, 0.05, 0.5);
+    const double bound_vox = std::clamp(2 * finest_bound_m() / voxel_m_, 0.05, 1.0);
     last_ = extract(solid, field, {.bound_vox = bound_vox}, progress);
     reference_ = {last_.positions, last_.triangles, {}};
     box_ = bounds(reference_);
@@ -138,8 +138,8 @@ BoundedSimplifier Chain::simplifier(double bound_m) {
     const auto probe = [&](double reach_m) {
         return field_->probe(box_.dilated(reach_m), reach_m);
     };
+    around_ = probe(8 * voxel_m_ + 5.5 * bound_m);
     probe_ = probe(2 * (voxel_m_ + bound_m));
-    around_ = probe(8 * (voxel_m_ + bound_m));
     return {last_, *around_,
             BoundedSettings{.spacing_m = voxel_m_, .few_crossings = kFewCrossings}};
 }

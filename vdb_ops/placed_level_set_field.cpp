@@ -174,11 +174,22 @@ private:
 
 } // namespace
 
-PlacedLevelSetField::PlacedLevelSetField(openvdb::FloatGrid::ConstPtr grid, const Similarity& at)
-    : grid_(std::move(grid)), at_(at) {
+PlacedLevelSetField::PlacedLevelSetField(openvdb::FloatGrid::ConstPtr grid, const Similarity& at,
+                                         Widen widen)
+    : grid_(std::move(grid)), at_(at), widen_(std::move(widen)), widest_(grid_) {
     if (!grid_)
         throw Error(Fault::bad_argument, "placed level set: the grid is null; give a level set");
     lattice_of(*grid_);
+    if (!widen_)
+        widen_ = [grid = grid_](float half_width) { return widen_band(*grid, half_width); };
+}
+
+openvdb::FloatGrid::ConstPtr PlacedLevelSetField::as_wide_as(double half_width_vox) const {
+    const std::lock_guard lock(mutex_);
+    const double have_vox = static_cast<double>(widest_->background()) / widest_->voxelSize().x();
+    if (half_width_vox > have_vox + 1e-3)
+        widest_ = widen_(static_cast<float>(half_width_vox));
+    return widest_;
 }
 
 std::unique_ptr<LatticeField> PlacedLevelSetField::on(const Lattice& lattice,
@@ -195,15 +206,12 @@ std::unique_ptr<LatticeField> PlacedLevelSetField::on(const Lattice& lattice,
     // Two voxels beyond the band, or every cell that it meets would hold clamped corners.
     const double half_width =
         static_cast<double>(lattice.half_width_vox) / frame.voxel + (same ? 0 : 2);
-    auto grid = grid_;
     if (half_width > kWidestBand_vox)
         throw Error(Fault::bad_argument,
                     "grid '" + grid_->getName() + "': a band of " + rounded(half_width) +
                         " of its voxels is asked for, at most 1000 are handled; use a smaller "
                         "voxel, or less offset and blend");
-    if (half_width > static_cast<double>(own.half_width_vox) + 1e-3)
-        grid = widen_band(*grid_, static_cast<float>(half_width));
-    return std::make_unique<LatticePlacedLevelSet>(grid, frame, lattice);
+    return std::make_unique<LatticePlacedLevelSet>(as_wide_as(half_width), frame, lattice);
 }
 
 } // namespace taihu

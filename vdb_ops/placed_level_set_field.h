@@ -1,4 +1,7 @@
 #pragma once
+#include <functional>
+#include <mutex>
+
 #include <openvdb/openvdb.h>
 
 #include "vdb_ops/field.h"
@@ -15,11 +18,16 @@ namespace taihu {
 ///
 /// Details finer than a voxel of the lattice are aliased: sample a fine level set on a lattice not
 /// much coarser. on() makes the widened band, of the half width asked for plus 2 of the grid's own
-/// voxels, and keeps it; blocks are then random access.
+/// voxels; blocks are then random access. The widest band made so far is kept.
 class PlacedLevelSetField final : public Field {
 public:
+    /// The same level set on a band of this half width [voxels].
+    using Widen = std::function<openvdb::FloatGrid::ConstPtr(float half_width_vox)>;
+
+    /// \param widen  for wider bands, where something better than widen_band() is known.
     /// \throws Error bad_argument: null, or as lattice_of().
-    explicit PlacedLevelSetField(openvdb::FloatGrid::ConstPtr grid, const Similarity& at = {});
+    explicit PlacedLevelSetField(openvdb::FloatGrid::ConstPtr grid, const Similarity& at = {},
+                                 Widen widen = {});
     /// \throws Error bad_argument: a band of more than 1000 of the grid's voxels; unsupported: as
     /// widen_band().
     std::unique_ptr<LatticeField> on(const Lattice& lattice,
@@ -29,8 +37,14 @@ public:
     std::unique_ptr<FieldProbe> probe(const Box& region_m, double reach_m) const override;
 
 private:
+    /// On a band of at least this half width [voxels].
+    openvdb::FloatGrid::ConstPtr as_wide_as(double half_width_vox) const;
+
     openvdb::FloatGrid::ConstPtr grid_;
     Similarity at_;
+    Widen widen_;
+    mutable std::mutex mutex_;
+    mutable openvdb::FloatGrid::ConstPtr widest_;
 };
 
 } // namespace taihu

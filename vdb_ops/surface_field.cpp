@@ -3,6 +3,7 @@
 #include "vdb_ops/mesh_field.h"
 #include "vdb_ops/placed_level_set_field.h"
 #include "vdb_ops/rasterize.h"
+#include "vdb_ops/redistance.h"
 #include "vdb_ops/superquadric_field.h"
 
 namespace taihu {
@@ -23,7 +24,15 @@ std::shared_ptr<const Field> surface_field(std::shared_ptr<const Field> field,
         if (area_vox2 > n_faces * kLeastFace_vox2 && mesh->n_primitives() > 1)
             return field;
     }
-    return std::make_shared<PlacedLevelSetField>(std::move(grid));
+    const auto widen = [field, grid](float half_width) -> openvdb::FloatGrid::ConstPtr {
+        constexpr float kWidest = 16; // that rasterize() makes: exact, and the quicker way
+        if (half_width > kWidest)
+            return widen_band(*grid, half_width);
+        Lattice lattice = lattice_of(*grid);
+        lattice.half_width_vox = half_width;
+        return rasterize(*field, lattice);
+    };
+    return std::make_shared<PlacedLevelSetField>(grid, Similarity(), widen);
 }
 
 } // namespace taihu
