@@ -5,19 +5,13 @@
 
 #include "stats/core/file.h"
 #include "stats/core/sha256.h"
-#include "tests/support/process.h"
+#include "tests/support/command.h"
 
 namespace taihu {
 namespace {
 
 using nlohmann::json;
 using testing::HasSubstr;
-
-json result(const std::string& command, const Scratch& scratch) {
-    const Finished said = run(command + " --json -q", scratch.path());
-    EXPECT_EQ(said.exit_code, 0) << command << '\n' << said.err;
-    return json::parse(said.out, nullptr, false);
-}
 
 /// A ball of 1 m without another, at y = 1.
 class LevelFiles : public testing::Test {

@@ -3,22 +3,13 @@
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
 
-#include "tests/support/process.h"
+#include "tests/support/command.h"
 
 namespace taihu {
 namespace {
 
 using nlohmann::json;
 using testing::HasSubstr;
-
-json result(const std::string& command, const Scratch& scratch) {
-    const Finished said = run(command + " --json -q", scratch.path());
-    EXPECT_EQ(said.exit_code, 0) << command << '\n' << said.err;
-    EXPECT_EQ(said.err, "") << command;
-    const json object = json::parse(said.out, nullptr, false);
-    EXPECT_TRUE(object.is_object()) << command << '\n' << said.out;
-    return object;
-}
 
 /// A box of a metre with 300 equal holes of 0.12 m: base.vdb, rock.vdb, law.json.
 void make_rock(const Scratch& scratch) {

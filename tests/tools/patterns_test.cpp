@@ -8,7 +8,7 @@
 #include <openvdb/openvdb.h>
 
 #include "stats/io/holes_file.h"
-#include "tests/support/process.h"
+#include "tests/support/command.h"
 
 namespace taihu {
 namespace {
@@ -16,14 +16,6 @@ namespace {
 using nlohmann::json;
 using testing::HasSubstr;
 using testing::Not;
-
-json result(const std::string& command, const Scratch& scratch) {
-    const Finished said = run(command + " --json -q", scratch.path());
-    EXPECT_EQ(said.exit_code, 0) << command << '\n' << said.err;
-    const json object = json::parse(said.out, nullptr, false);
-    EXPECT_TRUE(object.is_object()) << command << '\n' << said.out;
-    return object;
-}
 
 /// An exponential law in metres, mean 0.1 m; half of its holes are below the limit. Its table has
 /// diameters of 0.07 to 0.3 m.

@@ -5,7 +5,7 @@
 
 #include "mesh_out/io/exr_file.h"
 #include "mesh_out/io/image_file.h"
-#include "tests/support/process.h"
+#include "tests/support/command.h"
 
 namespace taihu {
 namespace {
@@ -13,15 +13,6 @@ namespace {
 using nlohmann::json;
 using testing::ElementsAre;
 using testing::HasSubstr;
-
-json result(const std::string& command, const Scratch& scratch) {
-    const Finished said = run(command + " --json -q", scratch.path());
-    EXPECT_EQ(said.exit_code, 0) << command << '\n' << said.err;
-    EXPECT_EQ(said.err, "") << command;
-    const json object = json::parse(said.out, nullptr, false);
-    EXPECT_TRUE(object.is_object()) << command << '\n' << said.out;
-    return object;
-}
 
 TEST(Relief, ATileCarriesItsScaleAndItsRecipe) {
     const Scratch scratch;

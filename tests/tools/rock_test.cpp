@@ -8,18 +8,13 @@
 
 #include "stats/core/file.h"
 #include "stats/io/holes_file.h"
-#include "tests/support/process.h"
+#include "tests/support/command.h"
 
 namespace taihu {
 namespace {
 
 using nlohmann::json;
 using testing::HasSubstr;
-
-void must(const std::string& command, const Scratch& folder) {
-    const Finished said = run(command, folder.path());
-    ASSERT_EQ(said.exit_code, 0) << command << "\n" << said.err;
-}
 
 bool same_bytes(const Scratch& folder, const std::string& a, const std::string& b) {
     return read_file(folder / a) == read_file(folder / b);

@@ -5,21 +5,13 @@
 
 #include "stats/fit.h"
 #include "stats/io/measurements.h"
-#include "tests/support/process.h"
+#include "tests/support/command.h"
 
 namespace taihu {
 namespace {
 
 using nlohmann::json;
 using testing::HasSubstr;
-
-json result(const std::string& command, const Scratch& scratch) {
-    const Finished said = run(command + " --json -q", scratch.path());
-    EXPECT_EQ(said.exit_code, 0) << command << '\n' << said.err;
-    const json object = json::parse(said.out, nullptr, false);
-    EXPECT_TRUE(object.is_object()) << command << '\n' << said.out;
-    return object;
-}
 
 /// A ball of radius 1 m full of holes, exponential with this rate: base.vdb, holes.csv, rock.vdb.
 void make_rock(const Scratch& scratch, int dim = 64, int rate = 12, int density = 300,

@@ -5,8 +5,8 @@
 #include <nlohmann/json.hpp>
 
 #include "stats/core/file.h"
+#include "tests/support/command.h"
 #include "tests/support/grids.h"
-#include "tests/support/process.h"
 #include "vdb_ops/tiles.h"
 #include "vdb_ops/vdb_file.h"
 
@@ -15,12 +15,6 @@ namespace {
 
 using nlohmann::json;
 using testing::HasSubstr;
-
-json must(const std::string& command, const Scratch& folder) {
-    const Finished said = run(command, folder.path());
-    EXPECT_EQ(said.exit_code, 0) << command << "\n" << said.err;
-    return said.out.empty() ? json() : json::parse(said.out);
-}
 
 std::string whole_hash(const std::filesystem::path& file) {
     return grid_hash(*read_vdb(file).solid);
@@ -34,20 +28,20 @@ TEST(TileCommands, ARecipeInTilesIsTheWhole) {
     const Scratch folder;
     const std::string rock = "taihu rock --preset taihu --dim 150 --height 1.8m --seed 7 ";
     must(rock + "-o whole.vdb -q", folder);
-    const json made = must(rock + "--tiles 128 -o tiles --json -q", folder);
+    const json made = result(rock + "--tiles 128 -o tiles", folder);
     EXPECT_GT(made["tiles"], 1);
     EXPECT_GT(made["bubbles_filled"], 0);
     EXPECT_EQ(tiles_hash(folder / "tiles"), whole_hash(folder / "whole.vdb"));
-    const json info = must("taihu info tiles/tiles.json --json", folder);
+    const json info = result("taihu info tiles/tiles.json", folder);
     EXPECT_EQ(info["kind"], "level set in tiles");
-    EXPECT_EQ(info["recipe"], must("taihu info whole.vdb --json", folder)["recipe"]);
+    EXPECT_EQ(info["recipe"], result("taihu info whole.vdb", folder)["recipe"]);
     const std::string tile = read_tile_set(folder / "tiles" / kTileSetName).tiles[0].file;
-    const json one = must("taihu info tiles/" + tile + " --json", folder);
+    const json one = result("taihu info tiles/" + tile, folder);
     EXPECT_EQ(one["kind"], "tile of a level set");
     EXPECT_EQ(one["tile"]["of"], "tiles.json");
     // By itself it is a closed solid.
     must("taihu mesh tiles/" + tile + " -o tile.ply -q", folder);
-    EXPECT_GT(must("taihu measure tiles/" + tile + " --json", folder)["volume_m3"], 0);
+    EXPECT_GT(result("taihu measure tiles/" + tile, folder)["volume_m3"], 0);
 }
 
 TEST(TileCommands, HolesCarvedInTilesAreThoseOfTheWhole) {
@@ -90,7 +84,7 @@ TEST(TileCommands, WhatDoesNotFitIsRefusedWithTheVoxelThatDoes) {
         must(command + " -q --memory 2GB", folder);
         std::filesystem::remove(folder / "a.vdb");
     }
-    const json dry = must("taihu rock r.json --dry-run --memory 60MB --json -q", folder);
+    const json dry = result("taihu rock r.json --dry-run --memory 60MB", folder);
     EXPECT_EQ(dry["fits"], false);
     // Leaves of a ball of radius r voxels: about 0.033 times 4 pi r^2.
     EXPECT_NEAR(dry["leaves"].get<double>(), 0.033 * 4 * 3.1416 * 150 * 150, 1500);
@@ -105,14 +99,14 @@ TEST(TileCommands, NecksAreCutAndTheRecipeSaysSo) {
                    {"box": {"size_m": [2, 0.1, 0.1]}}]}}})");
     must("taihu rock r.json -o base.vdb -q", folder);
     write_file(folder / "holes.csv", "x_m,y_m,z_m,radius_m\n-0.5,0.1,0,0.15\n");
-    const std::string carve = "taihu carve base.vdb --holes holes.csv -q --json ";
-    EXPECT_EQ(must(carve + "-o a.vdb", folder)["necked"], 0);
-    const json cut = must(carve + "--min-neck 20cm -o b.vdb", folder);
+    const std::string carve = "taihu carve base.vdb --holes holes.csv ";
+    EXPECT_EQ(result(carve + "-o a.vdb", folder)["necked"], 0);
+    const json cut = result(carve + "--min-neck 20cm -o b.vdb", folder);
     EXPECT_EQ(cut["necked"], 1);
     EXPECT_GT(cut["necked_m3"].get<double>(), 0.1); // pi / 6 * 0.6^3 = 0.113
     must("taihu rock --from b.vdb -o again.vdb -q", folder);
     EXPECT_EQ(read_file(folder / "again.vdb"), read_file(folder / "b.vdb"));
-    const json stands = must(carve + "--foot 15 -o d.vdb", folder);
+    const json stands = result(carve + "--foot 15 -o d.vdb", folder);
     EXPECT_GE(stands["foot"]["tilt_deg"].get<double>(), 15);
     EXPECT_GT(stands["foot"]["cut_m"].get<double>(), 0);
     must("taihu rock --from d.vdb -o again.vdb -q", folder);

@@ -5,7 +5,7 @@
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
 
-#include "tests/support/process.h"
+#include "tests/support/command.h"
 
 namespace taihu {
 namespace {
@@ -14,15 +14,6 @@ using nlohmann::json;
 using testing::HasSubstr;
 
 /// Run a command that must succeed, with --json, and give its object.
-json result(const std::string& command, const Scratch& scratch) {
-    const Finished said = run(command + " --json -q", scratch.path());
-    EXPECT_EQ(said.exit_code, 0) << command << '\n' << said.err;
-    EXPECT_EQ(said.err, "") << command;
-    const json object = json::parse(said.out, nullptr, false);
-    EXPECT_TRUE(object.is_object()) << command << '\n' << said.out;
-    return object;
-}
-
 const std::string kRock1 = TAIHU_DATA "/measurements/rock1.csv";
 
 TEST(Verbs, FromMeasurementsToACertifiedRock) {
