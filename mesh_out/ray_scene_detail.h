@@ -23,11 +23,11 @@ struct ScenePlacement {
         return {v.x * cos_turn + v.z * sin_turn, v.y, v.z * cos_turn - v.x * sin_turn};
     }
     Vec3 operator()(const Vec3& p) const { return turned((p - center) * scale); }
-    /// The other way.
-    Vec3 mesh_point(const Vec3& p) const {
-        return Vec3{p.x * cos_turn - p.z * sin_turn, p.y, p.z * cos_turn + p.x * sin_turn} / scale +
-               center;
+    // The other way.
+    Vec3 turned_back(const Vec3& v) const {
+        return {v.x * cos_turn - v.z * sin_turn, v.y, v.z * cos_turn + v.x * sin_turn};
     }
+    Vec3 mesh_point(const Vec3& p) const { return turned_back(p) / scale + center; }
 };
 
 /// What a ray meets first.

@@ -75,6 +75,8 @@ void check(const RenderSettings& s) {
     require(s.samples >= 1 && s.samples <= 4096, "samples", s.samples, "1..4096");
     require(s.ao_rays >= 1 && s.ao_rays <= 256, "ao_rays", s.ao_rays, "1..256");
     require(s.albedo >= 0 && s.albedo <= 1, "albedo", s.albedo, "0..1");
+    for (int k = 0; k < 3; ++k)
+        require(s.tint[k] >= 0 && s.tint[k] <= 1, "tint", s.tint[k], "0..1");
 }
 
 Box checked_bounds(std::span<const TriMesh> levels) {
@@ -203,7 +205,7 @@ private:
             return settings_.wireframe ? wire(corners, x_px, y_px, to)
                                        : stone(hit, corners, to, draws);
         }
-        if (settings_.ground && to.y < 0 && view_.eye.y > ground_)
+        if (settings_.ground && !settings_.plain && to.y < 0 && view_.eye.y > ground_)
             return tinted(backdrop, plain(to, draws));
         return backdrop;
     }
@@ -238,9 +240,25 @@ private:
         normal = side > 0 ? normal : side < 0 ? -normal : flat;
         const Vec3 at = corners[0] * (1 - hit.u - hit.v) + corners[1] * hit.u + corners[2] * hit.v +
                         flat * kRayOffset;
-        const double albedo =
-            settings_.albedo_at ? settings_.albedo_at(place_.mesh_point(at)) : settings_.albedo;
-        return albedo * (sky_light(at, normal, draws) + key_light(at, normal, draws));
+        double albedo = settings_.albedo;
+        if (settings_.normal_at || settings_.albedo_at) {
+            const Vec3 on_mesh = place_.mesh_point(at), own = place_.turned_back(normal);
+            if (settings_.albedo_at)
+                albedo = settings_.albedo_at(on_mesh, own);
+            if (settings_.normal_at)
+                normal = place_.turned(settings_.normal_at(on_mesh, own));
+        }
+        if (settings_.plain)
+            return plain_light(normal, to) * (settings_.albedo_at ? albedo : 1);
+        return tinted(settings_.tint, sky_light(at, normal, draws) + key_light(at, normal, draws)) *
+               albedo;
+    }
+
+    Vec3 plain_light(const Vec3& normal, const Vec3& to) const {
+        const PlainLight& plain = *settings_.plain;
+        const Vec3 seen = plain.light.direction(); // in the axes of the picture
+        const Vec3 light = view_.right * seen.x + view_.up * seen.y - view_.forward * seen.z;
+        return plain.color * intensity(plain.reflection, normal, light, -to);
     }
 
     /// What the backdrop is multiplied by where the ray meets the ground: its light as a share of

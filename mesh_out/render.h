@@ -1,13 +1,22 @@
 #pragma once
 #include <cstdint>
 #include <functional>
+#include <optional>
 #include <span>
 
 #include "stats/core/image.h"
 #include "stats/core/progress.h"
 #include "stats/core/tri_mesh.h"
+#include "vdb_ops/reflection.h"
 
 namespace taihu {
+
+/// One light far away and no shadows: Eq. 1 of Tsuruoka et al. in every point, times a colour.
+struct PlainLight {
+    Reflection reflection;
+    Vec3 color{0.5, 0.5, 0.5}; ///< linear
+    DistantLight light;        ///< x to the right, y up, z towards the viewer
+};
 
 /// How render() looks at a mesh; the defaults show stone as stone.
 struct RenderSettings {
@@ -17,11 +26,17 @@ struct RenderSettings {
     int samples = 16;              ///< paths per pixel, 1..4096
     int ao_rays = 5;               ///< sky rays per path, 1..256
     double albedo = 0.56;          ///< linear, 0..1
-    std::function<double(const Vec3&)> albedo_at = {}; ///< or at a place of the mesh [m], 0..1;
-                                                       ///< asked by many threads at a time
-    bool ground = true;     ///< a pale plain under the mesh that takes its shadow
-    bool wireframe = false; ///< edges drawn over flat-shaded faces
-    bool smooth = true;     ///< shade with the mesh's normals where it has them
+    /// Or at a place of the mesh [m] where it has this normal, 0..1; asked by many threads at a
+    /// time.
+    std::function<double(const Vec3& at, const Vec3& normal)> albedo_at = {};
+    Vec3 tint{1, 1, 1}; ///< colour that the albedo is multiplied by, linear, 0..1
+    /// The normal to shade with at a place of the mesh, of the mesh's own there: as a bump map.
+    /// Asked by many threads at a time.
+    std::function<Vec3(const Vec3& at, const Vec3& normal)> normal_at = {};
+    std::optional<PlainLight> plain = {}; ///< instead of sky and key light, without the ground
+    bool ground = true;                   ///< a pale plain under the mesh that takes its shadow
+    bool wireframe = false;               ///< edges drawn over flat-shaded faces
+    bool smooth = true;                   ///< shade with the mesh's normals where it has them
     std::uint64_t seed = 0;
 };
 

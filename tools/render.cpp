@@ -1,11 +1,18 @@
 // taihu render: a picture.
 #include "mesh_out/render.h"
 
+#include <algorithm>
+#include <cmath>
+
 #include "mesh_out/extract.h"
+#include "mesh_out/io/exr_file.h"
 #include "mesh_out/io/image_file.h"
+#include "mesh_out/relief_around.h"
 #include "stats/core/error.h"
 #include "stats/core/text.h"
 #include "tools/solid_files.h"
+#include "tools/units.h"
+#include "vdb_ops/relief.h"
 #include "vdb_ops/vdb_file.h"
 
 namespace taihu {
@@ -15,9 +22,15 @@ struct RenderArgs {
     SolidOptions file;
     std::filesystem::path out;
     std::string size;
-    bool levels = false, no_ground = false, flat = false;
+    std::filesystem::path relief, grain;
+    std::string around = "triplanar", tile_side, material, light_azimuth, light_elevation;
+    double relief_scale = 1;
+    std::optional<int> views;
+    bool levels = false, no_ground = false, flat = false, displace = false;
     RenderSettings settings;
 };
+
+constexpr int kMostViews = 360;
 
 void parse_picture_size(const std::string& text, RenderSettings& settings) {
     const std::size_t x = text.find('x');
@@ -41,7 +54,135 @@ std::vector<TriMesh> meshes_of(const RenderArgs& args, const Console& console) {
     return read_mesh(args.file.path, args.file.mesh_settings(), console.progress).levels;
 }
 
+ReliefMap map_of(const std::string& name) {
+    return name == "sphere"     ? ReliefMap::sphere
+           : name == "cube"     ? ReliefMap::cube
+           : name == "cylinder" ? ReliefMap::cylinder
+                                : ReliefMap::triplanar;
+}
+
+/// A tile of `taihu relief`, or any EXR with a channel Y.
+std::shared_ptr<const ReliefAround> tile_around(const RenderArgs& args,
+                                                const std::filesystem::path& path, double scale,
+                                                const Box& frame) {
+    const std::vector<std::string> heights = {"Y"};
+    ExrImage exr = read_exr(path, heights);
+    std::optional<double> pixel_m;
+    bool tileable = false;
+    for (const auto& [key, value] : exr.attributes) {
+        if (key == "pixel_m")
+            pixel_m = parse_number(value);
+        if (key == "wrap")
+            tileable = value == "periodic";
+    }
+    if (!args.tile_side.empty())
+        pixel_m = length_m("--tile-side", args.tile_side, {0, frame.longest()}) /
+                  std::max(1, exr.image.width - !tileable);
+    if (!pixel_m)
+        throw Error(Fault::bad_input, path.string() + ": does not say how large it is; give "
+                                                      "--tile-side");
+    for (float& h : exr.image.pixels)
+        h *= static_cast<float>(scale);
+    return std::make_shared<ReliefAround>(std::move(exr.image), *pixel_m, tileable,
+                                          map_of(args.around), frame);
+}
+
+void lay_relief(RenderArgs& args, TriMesh& mesh) {
+    const Box frame = bounds(mesh);
+    if (!args.grain.empty())
+        args.settings.albedo_at = [grain = tile_around(args, args.grain, 1, frame)](const Vec3& p,
+                                                                                    const Vec3& n) {
+            return std::clamp(grain->height_m(p, n), 0.0, 1.0);
+        };
+    if (args.relief.empty())
+        return;
+    const auto relief = tile_around(args, args.relief, args.relief_scale, frame);
+    if (args.displace) {
+        mesh = relief->displaced(mesh);
+        return;
+    }
+    args.settings.normal_at = [relief](const Vec3& p, const Vec3& n) {
+        return relief->bumped(p, n);
+    };
+}
+
+void light_plainly(RenderArgs& args) {
+    const ReliefMaterial& material = relief_preset(args.material).material;
+    PlainLight plain{material.reflection, material.color, {}};
+    if (!args.light_azimuth.empty())
+        plain.light.azimuth_deg = angle_deg("--light-azimuth", args.light_azimuth);
+    if (!args.light_elevation.empty())
+        plain.light.elevation_deg = angle_deg("--light-elevation", args.light_elevation);
+    args.settings.plain = plain;
+}
+
+/// The name of picture `i`: # stand for its digits.
+std::filesystem::path numbered(const std::filesystem::path& out, int i) {
+    std::string name = out.filename().string();
+    const std::size_t first = name.find('#'), n = name.find_first_not_of('#', first) - first;
+    std::string digits = std::to_string(i);
+    if (digits.size() < n)
+        digits.insert(0, n - digits.size(), '0');
+    return out.parent_path() / name.replace(first, n, digits);
+}
+
+/// A full turn: files of their own where the name has #, else a sheet as square as it gets.
+std::vector<std::string> render_turn(const RenderArgs& args, const TriMesh& mesh,
+                                     const Console& console) {
+    const int n = *args.views;
+    const bool apart = args.out.filename().string().find('#') != std::string::npos;
+    const int columns = static_cast<int>(std::ceil(std::sqrt(n))),
+              rows = (n + columns - 1) / columns;
+    const RenderSettings& s = args.settings;
+    if (!apart && (columns * s.width > 16384 || rows * s.height > 16384))
+        throw Error(Fault::bad_argument,
+                    "--views: a sheet of " + std::to_string(columns) + " x " +
+                        std::to_string(rows) +
+                        " pictures is larger than 16384 pixels; use a smaller --size, or # in the "
+                        "name for a file each");
+    Image sheet = apart ? Image() : Image(columns * s.width, rows * s.height, 3);
+    std::vector<std::string> files;
+    for (int i = 0; i < n; ++i) {
+        report_stage(console.progress,
+                     "view " + std::to_string(i + 1) + " of " + std::to_string(n));
+        RenderSettings view = s;
+        view.turntable_deg += 360.0 * i / n;
+        const Image image = render(mesh, view, console.progress);
+        if (apart) {
+            const std::filesystem::path file = numbered(args.out, i);
+            console.may_write(file);
+            write_image(file, image);
+            files.push_back(file.string());
+            continue;
+        }
+        for (int y = 0; y < s.height; ++y)
+            std::copy_n(image.at(0, y), 3 * s.width,
+                        sheet.at(i % columns * s.width, i / columns * s.height + y));
+    }
+    if (!apart) {
+        write_image(args.out, sheet);
+        files.push_back(args.out.string());
+    }
+    return files;
+}
+
+void check_options(const RenderArgs& args) {
+    const auto needs = [](bool given, const char* option, const char* other) {
+        if (given)
+            throw Error(Fault::bad_argument,
+                        std::string(option) + ": is for " + other + "; give that, or drop it");
+    };
+    const bool tiled = !args.relief.empty() || !args.grain.empty();
+    needs(args.displace && args.relief.empty(), "--displace", "--relief");
+    needs(args.relief_scale != 1 && args.relief.empty(), "--relief-scale", "--relief");
+    needs(!args.tile_side.empty() && !tiled, "--tile-side", "--relief or --grain");
+    needs(!args.light_azimuth.empty() && args.material.empty(), "--light-azimuth", "--material");
+    needs(!args.light_elevation.empty() && args.material.empty(), "--light-elevation",
+          "--material");
+}
+
 void run(RenderArgs& args, const Console& console) {
+    check_options(args);
     console.may_write(args.out);
     if (args.out.extension() != ".png" && args.out.extension() != ".exr")
         throw Error(Fault::unsupported,
@@ -50,13 +191,24 @@ void run(RenderArgs& args, const Console& console) {
         parse_picture_size(args.size, args.settings);
     args.settings.ground = !args.no_ground;
     args.settings.smooth = !args.flat;
-    const std::vector<TriMesh> meshes = meshes_of(args, console);
+    if (!args.material.empty())
+        light_plainly(args);
+    std::vector<TriMesh> meshes = meshes_of(args, console);
+    lay_relief(args, meshes.front());
     report_stage(console.progress, "rendering");
-    const Image image = args.levels ? render_sheet(meshes, args.settings, console.progress)
-                                    : render(meshes.front(), args.settings, console.progress);
-    write_image(args.out, image);
-    console.say("{}: {} x {} pixels", args.out.string(), image.width, image.height);
-    console.result({{"file", args.out.string()}, {"width", image.width}, {"height", image.height}});
+    std::vector<std::string> files = {args.out.string()};
+    if (args.views)
+        files = render_turn(args, meshes.front(), console);
+    else
+        write_image(args.out, args.levels
+                                  ? render_sheet(meshes, args.settings, console.progress)
+                                  : render(meshes.front(), args.settings, console.progress));
+    for (const std::string& file : files)
+        console.say("{}: written", file);
+    console.result({{"files", files},
+                    {"width", args.settings.width},
+                    {"height", args.settings.height},
+                    {"views", args.views.value_or(1)}});
 }
 
 } // namespace
@@ -66,7 +218,10 @@ void add_render(CLI::App& app, Console& console) {
     auto* verb = console.verb(app, "render", "Make a picture of a solid or a mesh",
                               "  taihu render rock.glb -o rock.png\n"
                               "  taihu render rock.vdb --turntable 90 --size 800x1000 -o side.exr\n"
-                              "  taihu render rock.glb --levels -o sheet.png");
+                              "  taihu render rock.glb --levels -o sheet.png\n"
+                              "  taihu render rock.glb --views 12 -o turn_##.png\n"
+                              "  taihu render ball.ply --relief tile.exr --around sphere "
+                              "--material broken-rock -o ball.png");
     RenderSettings& s = args->settings;
     verb->add_option("file", args->file.path, "What to show (.vdb .obj .ply .stl .off .glb .drc)")
         ->required();
@@ -83,7 +238,36 @@ void add_render(CLI::App& app, Console& console) {
     verb->add_option("--samples", s.samples, "Paths per pixel, 1..4096")
         ->check(CLI::Range(1, 4096))
         ->capture_default_str();
-    verb->add_flag("--levels", args->levels, "All levels of a GLB side by side, wireframes inset");
+    auto* levels = verb->add_flag("--levels", args->levels,
+                                  "All levels of a GLB side by side, wireframes inset");
+    verb->add_option("--views", args->views,
+                     "A full turn in so many views, 1..360: a sheet, or files where # stand for "
+                     "digits in the name")
+        ->check(CLI::Range(1, kMostViews))
+        ->excludes(levels);
+    verb->add_option("--relief", args->relief,
+                     "A height tile (.exr of taihu relief) laid around it: bumps its normals")
+        ->excludes(levels);
+    verb->add_option("--around", args->around,
+                     "How: sphere, cube, cylinder, or triplanar, along three axes without seams")
+        ->check(CLI::IsMember({"sphere", "cube", "cylinder", "triplanar"}))
+        ->capture_default_str();
+    verb->add_option("--relief-scale", args->relief_scale, "Its heights times this")
+        ->check(CLI::Range(-1e6, 1e6))
+        ->capture_default_str();
+    verb->add_flag("--displace", args->displace, "Move the vertices, too, not the normals alone");
+    verb->add_option("--grain", args->grain,
+                     "A tile (.exr) of albedo, 0..1, laid around it likewise")
+        ->excludes(levels);
+    verb->add_option("--tile-side", args->tile_side,
+                     "Of a tile on the object: 20cm, or 50% of its longest side [its own]");
+    verb->add_option("--material", args->material,
+                     "Light it plainly, as a relief preset is: broken-rock, unglazed-china, "
+                     "casting, ... [sky and sun]");
+    verb->add_option("--light-azimuth", args->light_azimuth,
+                     "With --material: where light comes from, from the right towards up [135]");
+    verb->add_option("--light-elevation", args->light_elevation,
+                     "With --material: towards the eye [40]");
     verb->add_flag("--wireframe", s.wireframe, "Show the triangles");
     verb->add_flag("--flat", args->flat, "Shade by faces instead of by normals");
     verb->add_flag("--no-ground", args->no_ground, "Without the plain that takes the shadow");

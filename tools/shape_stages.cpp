@@ -120,7 +120,9 @@ void write_stages(const ShapeSettings& settings, StageBump bump,
         write_file(mesh, bytes);
         RenderSettings look{.width = 360, .height = 360, .wireframe = !stage.lit};
         if (stage.textured)
-            look.albedo_at = [&](const Vec3& p) { return 0.5 * (1 + 0.7 * grain(rng, p)); };
+            look.albedo_at = [&](const Vec3& p, const Vec3&) {
+                return 0.5 * (1 + 0.7 * grain(rng, p));
+            };
         write_image(picture, render(stage.mesh, look, console.progress));
         console.say("{}: {} triangles", mesh.string(), stage.mesh.triangles.size());
     }

@@ -217,7 +217,7 @@ TEST(Render, TakesTheAlbedoOfAPlace) {
     const Vec3 center{3, -2, 5};
     RenderSettings settings = quick();
     settings.turntable_deg = 130;
-    settings.albedo_at = [&](const Vec3& p) {
+    settings.albedo_at = [&](const Vec3& p, const Vec3&) {
         EXPECT_NEAR(length(p - center), 2, 0.01); // on the ball; chords of 64 sides
         return p.y > center.y ? 0.0 : 0.5;
     };
