@@ -1,0 +1,66 @@
+#include "mesh_out/lost_surface_detail.h"
+
+#include <cmath>
+#include <memory>
+
+#include <gtest/gtest.h>
+
+#include "vdb_ops/balls_field.h"
+#include "vdb_ops/csg_field.h"
+#include "vdb_ops/rasterize.h"
+
+namespace taihu {
+namespace {
+
+using Balls = std::vector<Sphere>;
+
+std::shared_ptr<const Field> balls(Balls of) {
+    return std::make_shared<BallsField>(std::move(of));
+}
+
+std::vector<Vec3> lost(const Field& field) {
+    const auto grid = rasterize(field, Lattice{1, {}, 3});
+    const auto probe = field.probe({{-60, -60, -60}, {60, 60, 60}}, 2);
+    return lost_surface(*grid, *probe);
+}
+
+TEST(LostSurface, NothingIsLostWhereVoxelsSeeAll) {
+    EXPECT_TRUE(lost(*balls({{{0.3, 0.2, 0.1}, 20}})).empty());
+    const DifferenceField holed(balls({{{0, 0, 0}, 20}}), balls({{{18, 3, 2}, 8}}));
+    EXPECT_TRUE(lost(holed).empty());
+}
+
+TEST(LostSurface, FindsAWallBetweenTwoLayersOfVoxels) {
+    // Two holes of radius 30 leave a wall that is 0.3 voxels thick in its middle, between x = 0 and
+    // x = 1, where no lattice point is.
+    const DifferenceField wall(balls({{{0, 0, 0}, 50}}),
+                               balls({{{-29.65, 0, 0}, 30}, {{30.65, 0, 0}, 30}}));
+    const auto points = lost(wall);
+    const auto probe = wall.probe({{-60, -60, -60}, {60, 60, 60}}, 2);
+    // Thinner than 0.35 + 0.3 voxels on either side of a layer up to r: r^2 / 30 < 0.35.
+    std::size_t n_middle = 0;
+    for (const Vec3& p : points) {
+        EXPECT_NEAR(probe->at(p).value_m, 0, 1e-4); // of a voxel: to what projections go
+        n_middle += std::hypot(p.y, p.z) < 3 && p.x > 0.3 && p.x < 0.7;
+    }
+    EXPECT_GT(n_middle, 20u); // of 28 lattice points on either side
+    // Every point of that disc has one within a voxel.
+    for (double y = -2; y <= 2; y += 0.5)
+        for (double z = -2; z <= 2; z += 0.5) {
+            double least = 9;
+            for (const Vec3& p : points)
+                least = std::min(least, length(p - Vec3{0.35, y, z}));
+            EXPECT_LT(least, 1);
+        }
+}
+
+TEST(LostSurface, FindsABallBetweenVoxels) {
+    const auto field = balls({{{0, 0, 0}, 10}, {{20.5, 0.5, 0.5}, 0.6}});
+    const auto points = lost(*field);
+    ASSERT_FALSE(points.empty());
+    for (const Vec3& p : points)
+        EXPECT_NEAR(length(p - Vec3{20.5, 0.5, 0.5}), 0.6, 1e-4);
+}
+
+} // namespace
+} // namespace taihu
