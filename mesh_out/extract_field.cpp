@@ -84,23 +84,18 @@ LabelledMesh extract(const openvdb::FloatGrid& solid, const Field* field,
         const DualSurface surface(blocks, points);
         if (!in_band(blocks, surface, solid))
             refuse_clipped(solid);
-        Mesher mesher(blocks, surface, points, progress);
+        Mesher mesher(blocks, surface, points, small, progress);
         const std::vector<std::uint32_t> stuck = mesher.run();
+        
         // Some cross to the last in solids that the voxels hardly resolve; the certificate counts.
         if (stuck.empty() || attempt + 1 == kMostAttempts) {
             LabelledMesh mesh = mesher.take();
             part_long_triangles(mesh, *probe, lattice, settings.bound_vox / 2, progress);
             return mesh;
         }
-        for (const std::uint32_t v : stuck) {
-            const CellRef& cell = surface.cell(v);
-            const auto c = CellBlocks::local(cell.first);
+        for (const std::uint32_t v : stuck)
             for (const int size : {2, 4})
-                small.insert((std::uint64_t{cell.block} * 512 +
-                              CellBlocks::number({c.x() & -size, c.y() & -size, c.z() & -size})) *
-                                 8 +
-                             static_cast<unsigned>(size));
-        }
+                small.insert(small_cell(surface.cell(v), size));
     }
 }
 

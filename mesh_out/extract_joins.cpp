@@ -76,6 +76,9 @@ bool Mesher::join_near(std::span<const std::uint32_t> polygons, double near_m,
 
 /// Makes `w` the vertex `v`, if the surface stays what it is.
 bool Mesher::join(std::uint32_t v, std::uint32_t w) {
+    for (const std::uint32_t end : {v, w})
+        if (apart_.contains(small_cell(surface_.cell(end), 2)))
+            return false;
     Vertices all;
     for (const std::uint32_t end : {v, w})
         for (std::uint32_t x = end; x != kNone; x = next_[x])

@@ -7,6 +7,7 @@
 #include <tbb/blocked_range.h>
 #include <tbb/parallel_for.h>
 
+#include "mesh_out/cell_sizes_detail.h"
 #include "mesh_out/dual_surface_detail.h"
 #include "mesh_out/labelled_mesh.h"
 #include "mesh_out/surface_points_detail.h"
@@ -18,9 +19,10 @@ namespace taihu {
 /// moves vertices until no triangles cross.
 class Mesher {
 public:
+    /// \param apart  cells whose vertices are joined to no others.
     Mesher(const CellBlocks& blocks, const DualSurface& surface, const SurfacePoints& points,
-           Progress* progress)
-        : blocks_(blocks), surface_(surface), points_(points), progress_(progress),
+           const SmallCells& apart, Progress* progress)
+        : blocks_(blocks), surface_(surface), points_(points), apart_(apart), progress_(progress),
           polygons_(surface.polygons()) {}
 
     /// \return the vertices of what crosses to the last.
@@ -75,6 +77,7 @@ private:
     const CellBlocks& blocks_;
     const DualSurface& surface_;
     const SurfacePoints& points_;
+    const SmallCells& apart_;
     Progress* progress_;
     std::vector<DualPolygon> polygons_; ///< those of less than 3 vertices are no more
     std::vector<Crossing> crossings_;   ///< one for each polygon

@@ -15,6 +15,8 @@ namespace {
 
 /// Vertices of two sheets, in voxels: so that rounding does not bring them together.
 constexpr double kLeastApart_vox = 0.02;
+/// Areas and lengths of triangles that cannot cross others, in voxels.
+constexpr double kLeast = 1e-3;
 
 void make_set(std::vector<std::uint32_t>& all) {
     std::sort(all.begin(), all.end());
@@ -135,7 +137,8 @@ std::vector<std::uint8_t> Mesher::untamed() const {
     tbb::parallel_for(tbb::blocked_range<std::size_t>(0, tame.size(), 1024), [&](const auto& r) {
         for (std::size_t v = r.begin(); v < r.end(); ++v) {
             const CellRef& cell = surface_.cell(v);
-            tame[v] = next_[v] == kNone && in_cell(v) &&
+            tame[v] = next_[v] == kNone &&
+                      cell_box(v).dilated(-kLeast * points_.voxel_m()).contains(mesh_.positions[v]) &&
                       alternating_faces(blocks_[cell.block].corners(CellBlocks::local(cell.first),
                                                                     cell.size)) == 0;
         }
@@ -151,7 +154,6 @@ std::vector<std::uint8_t> Mesher::untamed() const {
 }
 
 bool Mesher::is_tame(std::size_t polygon) const {
-    constexpr double kLeast = 1e-3; // of areas and lengths, in voxels
     const auto& edge = surface_.edges()[polygon];
     const int axis = edge.key / 512, b = (axis + 1) % 3, c = (axis + 2) % 3;
     const auto local = CellBlocks::local(edge.key % 512);
@@ -170,14 +172,12 @@ bool Mesher::is_tame(std::size_t polygon) const {
         if (surface_.cell(v).size == surface_.cell(w).size)
             continue;
         const Box face{max(one.lo, other.lo), min(one.hi, other.hi)};
-        for (int a = 0; a < 3; ++a)
-            if (const Vec3 p = mesh_.positions[v], way = mesh_.positions[w] - p;
-                face.lo[a] == face.hi[a]) {
-                Vec3 at = p + way * ((face.lo[a] - p[a]) / way[a]);
-                at[a] = face.lo[a];
-                if (!face.contains(at))
-                    return false;
-            }
+        const Vec3 p = mesh_.positions[v], way = mesh_.positions[w] - p;
+        const int a = face.lo.x == face.hi.x ? 0 : face.lo.y == face.hi.y ? 1 : 2;
+        const Vec3 at = p + way * ((face.lo[a] - p[a]) / way[a]);
+        for (const int side : {(a + 1) % 3, (a + 2) % 3})
+            if (!(at[side] > face.lo[side] + kLeast * h && at[side] < face.hi[side] - kLeast * h))
+                return false;
     }
     for (auto t = first_triangle_[polygon]; t < first_triangle_[polygon + 1]; ++t) {
         const auto& [u, v, w] = mesh_.triangles[t];
