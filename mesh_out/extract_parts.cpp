@@ -46,11 +46,16 @@ public:
         find();
         if (parts_.empty())
             return false;
+        list_triangles();
         do { // each time there is a part less
             check_cancelled(progress);
             split();
         } while (drop());
-        mesh_.triangles = std::move(triangles_);
+        for (std::size_t k = 0; k < parted_.size(); ++k) {
+            mesh_.triangles[parted_[k]] = new_[first_[k]];
+            mesh_.triangles.insert(mesh_.triangles.end(), new_.begin() + first_[k] + 1,
+                                   new_.begin() + first_[k + 1]);
+        }
         return true;
     }
 
@@ -152,51 +157,75 @@ private:
         return static_cast<std::uint32_t>(n_before_ + std::size_t(at - parts_.begin()));
     }
 
-    /// Makes triangles_, new_ and the new vertices from the parts that are left.
+    Middles middles(const Triangle& t) const {
+        Middles middle;
+        for (std::size_t k = 0; k < 3; ++k)
+            middle[k] = vertex(std::min(t[k], t[(k + 1) % 3]), std::max(t[k], t[(k + 1) % 3]));
+        return middle;
+    }
+
+    /// Those to part, and those that may reach their parts: these are small against 16 voxels.
+    void list_triangles() {
+        std::vector<std::uint8_t> is_end(n_before_), has_corner(mesh_.triangles.size());
+        std::unordered_set<openvdb::Coord> close;
+        for (const Part& p : parts_) {
+            if (p.from == kTriangle)
+                has_corner[p.to] = 1;
+            else
+                is_end[p.from] = is_end[p.to] = 1;
+            for (int k = 0; k < 27; ++k)
+                close.insert(coarse(p.point).offsetBy(k / 9 - 1, k / 3 % 3 - 1, k % 3 - 1));
+        }
+        for (std::uint32_t t = 0; t < mesh_.triangles.size(); ++t) {
+            const Triangle& corners = mesh_.triangles[t];
+            if (has_corner[t] || (is_end[corners[0]] + is_end[corners[1]] + is_end[corners[2]] > 1 &&
+                                  middles(corners) != Middles()))
+                parted_.push_back(t);
+            else if (close.contains(coarse(mesh_.positions[corners[0]])))
+                near_.push_back(corners);
+        }
+    }
+    openvdb::Coord coarse(const Vec3& p) const {
+        const Vec3 at = (p - lattice_.origin) / (16 * lattice_.voxel_m);
+        return {int(std::floor(at.x)), int(std::floor(at.y)), int(std::floor(at.z))};
+    }
+
+    /// Makes new_ and the new vertices from the parts that are left.
     void split() {
         mesh_.positions.resize(n_before_);
         mesh_.labels.resize(n_before_);
-        std::vector<std::uint8_t> is_end(n_before_), is_parted(mesh_.triangles.size());
         for (const Part& p : parts_) {
             mesh_.positions.push_back(p.point);
             mesh_.labels.push_back(p.labels);
-            if (p.from == kTriangle)
-                is_parted[p.to] = 1;
-            else
-                is_end[p.from] = is_end[p.to] = 1;
         }
-        triangles_.clear();
         new_.clear();
-        for (std::uint32_t t = 0; t < mesh_.triangles.size(); ++t) {
+        first_.clear();
+        for (const std::uint32_t t : parted_) {
+            first_.push_back(static_cast<std::ptrdiff_t>(new_.size()));
             const Triangle& corners = mesh_.triangles[t];
-            Middles middle;
-            if (is_end[corners[0]] + is_end[corners[1]] + is_end[corners[2]] > 1)
-                for (std::size_t k = 0; k < 3; ++k)
-                    middle[k] = vertex(std::min(corners[k], corners[(k + 1) % 3]),
-                                       std::max(corners[k], corners[(k + 1) % 3]));
-            const bool parted = is_parted[t] || middle[0] || middle[1] || middle[2];
-            if (is_parted[t])
-                add_fan(corners, middle, *vertex(kTriangle, t));
-            else if (parted)
+            const Middles middle = middles(corners);
+            if (const auto corner = vertex(kTriangle, t))
+                add_fan(corners, middle, *corner);
+            else if (middle != Middles())
                 add_parts(corners, middle);
             else
-                triangles_.push_back(corners);
-            new_.resize(triangles_.size(), parted);
+                new_.push_back(corners);
         }
+        first_.push_back(static_cast<std::ptrdiff_t>(new_.size()));
     }
     void add_fan(const Triangle& t, const Middles& middle, std::uint32_t c) {
         for (std::size_t k = 0; k < 3; ++k) {
             const std::uint32_t next = t[(k + 1) % 3];
-            triangles_.push_back({t[k], middle[k].value_or(next), c});
+            new_.push_back({t[k], middle[k].value_or(next), c});
             if (middle[k])
-                triangles_.push_back({*middle[k], next, c});
+                new_.push_back({*middle[k], next, c});
         }
     }
     void add_parts(const Triangle& t, const Middles& middle) {
         if (middle[0] && middle[1] && middle[2]) {
             for (std::size_t k = 0; k < 3; ++k)
-                triangles_.push_back({t[k], *middle[k], *middle[(k + 2) % 3]});
-            triangles_.push_back({*middle[0], *middle[1], *middle[2]});
+                new_.push_back({t[k], *middle[k], *middle[(k + 2) % 3]});
+            new_.push_back({*middle[0], *middle[1], *middle[2]});
             return;
         }
         // Turned so that the first edge is parted and the last is not.
@@ -208,28 +237,29 @@ private:
             const std::uint32_t l = *second;
             const auto& p = mesh_.positions;
             const bool from_a = length_squared(p[l] - p[a]) <= length_squared(p[c] - p[m]);
-            triangles_.push_back({m, b, l});
-            triangles_.push_back(from_a ? Triangle{a, m, l} : Triangle{a, m, c});
-            triangles_.push_back(from_a ? Triangle{a, l, c} : Triangle{m, l, c});
+            new_.push_back({m, b, l});
+            new_.push_back(from_a ? Triangle{a, m, l} : Triangle{a, m, c});
+            new_.push_back(from_a ? Triangle{a, l, c} : Triangle{m, l, c});
         } else {
-            triangles_.push_back({a, m, c});
-            triangles_.push_back({m, b, c});
+            new_.push_back({a, m, c});
+            new_.push_back({m, b, c});
         }
     }
 
     /// Takes back the parts whose triangles cross others, have no area, or come next to others.
     bool drop() {
-        std::vector<Triangle> faces;
-        std::vector<std::uint8_t> picked;
-        list_near(faces, picked);
+        std::vector<Triangle> faces = new_;
+        faces.insert(faces.end(), near_.begin(), near_.end());
+        std::vector<std::uint8_t> picked(faces.size());
+        std::fill_n(picked.begin(), new_.size(), 1);
         const auto drop_at = [&](const Triangle& t) {
             for (const std::uint32_t v : t)
                 if (v >= n_before_)
                     parts_[v - n_before_].dropped = true;
         };
-        for (std::size_t f = 0; f < faces.size(); ++f)
-            if (picked[f] && is_needle(faces[f]))
-                drop_at(faces[f]);
+        for (const Triangle& t : new_)
+            if (is_needle(t))
+                drop_at(t);
         for (const auto& [f, g] : crossing_pairs(mesh_.positions, faces, picked)) {
             drop_at(faces[f]);
             drop_at(faces[g]);
@@ -240,23 +270,6 @@ private:
         const bool any = end != parts_.end();
         parts_.erase(end, parts_.end());
         return any;
-    }
-    /// The triangles that may reach new ones: parts are small against 16 voxels.
-    void list_near(std::vector<Triangle>& faces, std::vector<std::uint8_t>& picked) const {
-        const auto coarse = [&](const Vec3& p) {
-            const Vec3 at = (p - lattice_.origin) / (16 * voxel_m_);
-            return openvdb::Coord(int(std::floor(at.x)), int(std::floor(at.y)),
-                                  int(std::floor(at.z)));
-        };
-        std::unordered_set<openvdb::Coord> close;
-        for (const Part& part : parts_)
-            for (int k = 0; k < 27; ++k)
-                close.insert(coarse(part.point).offsetBy(k / 9 - 1, k / 3 % 3 - 1, k % 3 - 1));
-        for (std::size_t t = 0; t < triangles_.size(); ++t)
-            if (new_[t] || close.contains(coarse(mesh_.positions[triangles_[t][0]]))) {
-                faces.push_back(triangles_[t]);
-                picked.push_back(new_[t]);
-            }
     }
     bool is_needle(const Triangle& t) const {
         constexpr double kThin = 1e-3; // height over length
@@ -288,8 +301,10 @@ private:
     double voxel_m_, bound_m_;
     std::size_t from_, n_before_;
     std::vector<Part> parts_; ///< ascending
-    std::vector<Triangle> triangles_;
-    std::vector<std::uint8_t> new_; ///< of triangles_
+    std::vector<std::uint32_t> parted_;  ///< triangles
+    std::vector<Triangle> new_;          ///< what they become
+    std::vector<std::ptrdiff_t> first_;  ///< of new_, for each parted
+    std::vector<Triangle> near_;
 };
 
 } // namespace

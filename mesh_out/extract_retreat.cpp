@@ -155,15 +155,19 @@ std::vector<std::uint8_t> Mesher::untamed() const {
 
 bool Mesher::is_tame(std::size_t polygon) const {
     const auto& edge = surface_.edges()[polygon];
+    const auto& [vertices, n] = polygons_[polygon];
+    int size = 4; // of the smallest cell around: the edge is as long
+    for (std::size_t k = 0; k < n; ++k)
+        size = std::min<int>(size, surface_.cell(vertices[k]).size);
     const int axis = edge.key / 512, b = (axis + 1) % 3, c = (axis + 2) % 3;
-    const auto local = CellBlocks::local(edge.key % 512);
-    const Vec3 from = points_.voxel(blocks_[edge.block].origin + local);
-    const double h = points_.voxel_m(), turn = blocks_[edge.block].in(local) ? 1 : -1;
+    auto first = CellBlocks::local(edge.key % 512);
+    const double h = points_.voxel_m(), turn = blocks_[edge.block].in(first) ? 1 : -1;
+    first[axis] &= -size;
+    const Vec3 from = points_.voxel(blocks_[edge.block].origin + first);
     const auto area = [&](std::uint32_t v, std::uint32_t w) {
         const Vec3 p = mesh_.positions[v] - from, q = mesh_.positions[w] - from;
         return turn * (p[b] * q[c] - p[c] * q[b]);
     };
-    const auto& [vertices, n] = polygons_[polygon];
     for (std::size_t k = 0; k < n; ++k) {
         const std::uint32_t v = vertices[k], w = vertices[(k + 1) % n];
         if (!(area(v, w) > kLeast * h * h))
@@ -185,7 +189,7 @@ bool Mesher::is_tame(std::size_t polygon) const {
                      all = at_u + at_v + at_w;
         const auto along = [&](std::uint32_t x) { return mesh_.positions[x][axis] - from[axis]; };
         const double meets = (at_u * along(u) + at_v * along(v) + at_w * along(w)) / all;
-        if (!(all > kLeast * h * h && meets > kLeast * h && meets < (1 - kLeast) * h))
+        if (!(all > kLeast * h * h && meets > kLeast * h && meets < (size - kLeast) * h))
             return false;
     }
     return true;

@@ -57,9 +57,8 @@ public:
 
 private:
     Crossing found_on_edge(const openvdb::Coord& voxel, int axis) const;
-    /// The nearest point of one primitive, from near it: two steps; none where it is not that of
-    /// the field.
-    std::optional<Vec3> beside(Primitive primitive, const Vec3& p) const;
+    /// The point of a face near the mean of its crossings; none where that is far off.
+    std::optional<Vec3> beside(std::span<const Crossing> crossings, const Vec3& mean) const;
     std::optional<LabelledPoint> settle(PrimitiveSet set, const Vec3& from, const Box& cell,
                                         double slack_m) const;
     /// The middle of a rim that passes two faces of the cell between crossings.
