@@ -1,15 +1,8 @@
 #include <algorithm>
-#include <array>
 #include <cmath>
-#include <numeric>
-#include <span>
 #include <string>
-#include <tuple>
-#include <unordered_set>
 
-#include <tbb/blocked_range.h>
 #include <tbb/parallel_for.h>
-#include <tbb/parallel_sort.h>
 
 #include "mesh_out/cell_sizes_detail.h"
 #include "mesh_out/dual_surface_detail.h"
@@ -86,7 +79,7 @@ LabelledMesh extract(const openvdb::FloatGrid& solid, const Field* field,
             refuse_clipped(solid);
         Mesher mesher(blocks, surface, points, small, progress);
         const std::vector<std::uint32_t> stuck = mesher.run();
-        
+
         // Some cross to the last in solids that the voxels hardly resolve; the certificate counts.
         if (stuck.empty() || attempt + 1 == kMostAttempts) {
             LabelledMesh mesh = mesher.take();

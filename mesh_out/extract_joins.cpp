@@ -91,8 +91,9 @@ bool Mesher::join(std::uint32_t v, std::uint32_t w) {
     if (!is_disk(after, v))
         return false;
     if (mesh_.labels[v] == mesh_.labels[w]) {
-        const auto middle = onto(points_.field(), mesh_.labels[v],
-                                 (mesh_.positions[v] + mesh_.positions[w]) * 0.5, points_.voxel_m());
+        const auto middle =
+            onto(points_.field(), mesh_.labels[v], (mesh_.positions[v] + mesh_.positions[w]) * 0.5,
+                 points_.voxel_m());
         if (!middle || !points_.is_on(*middle))
             return false;
         mesh_.positions[v] = *middle;

@@ -49,9 +49,9 @@ void Mesher::find_crossings() {
     const auto& edges = surface_.edges();
     crossings_.resize(edges.size());
     each(edges.size(), [&](const SurfacePoints& points, std::size_t i) {
-        crossings_[i] = points.on_edge(blocks_[edges[i].block].origin +
-                                           CellBlocks::local(edges[i].key % 512),
-                                       edges[i].key / 512);
+        crossings_[i] =
+            points.on_edge(blocks_[edges[i].block].origin + CellBlocks::local(edges[i].key % 512),
+                           edges[i].key / 512);
     });
 }
 
@@ -73,7 +73,8 @@ void Mesher::place() {
     mesh_.labels.resize(surface_.n_vertices());
     stage_.assign(surface_.n_vertices(), 0);
     each(surface_.n_vertices(), [&](const SurfacePoints& points, std::size_t v) {
-        const auto placed = points.place(crossings_of(v), cell_box(v), kSlack_vox * points.voxel_m());
+        const auto placed =
+            points.place(crossings_of(v), cell_box(v), kSlack_vox * points.voxel_m());
         mesh_.positions[v] = placed.point;
         mesh_.labels[v] = placed.labels;
     });
@@ -82,7 +83,8 @@ void Mesher::place() {
 void Mesher::split_all() {
     first_triangle_.assign(polygons_.size() + 1, 0);
     for (std::size_t i = 0; i < polygons_.size(); ++i)
-        first_triangle_[i + 1] = first_triangle_[i] + std::max<std::uint32_t>(polygons_[i].n, 2) - 2;
+        first_triangle_[i + 1] =
+            first_triangle_[i] + std::max<std::uint32_t>(polygons_[i].n, 2) - 2;
     mesh_.triangles.resize(first_triangle_.back());
     each(polygons_.size(), [&](const SurfacePoints& points, std::size_t i) { split(points, i); });
 }
@@ -135,9 +137,8 @@ bool Mesher::along_first(const SurfacePoints& points, const std::array<std::uint
     };
     // Three corners along one rim make no triangle worth the name.
     const auto flatness = [](const Vec3& p, const Vec3& q, const Vec3& r) {
-        return length(cross(q - p, r - p)) /
-               std::max({length_squared(q - p), length_squared(r - q), length_squared(p - r),
-                         1e-300});
+        return length(cross(q - p, r - p)) / std::max({length_squared(q - p), length_squared(r - q),
+                                                       length_squared(p - r), 1e-300});
     };
     const double wide = std::min(flatness(a, b, c), flatness(a, c, d)),
                  wide_across = std::min(flatness(b, c, d), flatness(b, d, a));
@@ -148,8 +149,8 @@ bool Mesher::along_first(const SurfacePoints& points, const std::array<std::uint
     const double first = least(a, b, c, d, whole), second = least(b, c, d, a, whole);
     if (std::min(first, second) < kUpright && first != second)
         return first > second;
-    const bool on_rim = l[v[0]].size() != 1 ||
-                        !(l[v[0]] == l[v[1]] && l[v[1]] == l[v[2]] && l[v[2]] == l[v[3]]);
+    const bool on_rim =
+        l[v[0]].size() != 1 || !(l[v[0]] == l[v[1]] && l[v[1]] == l[v[2]] && l[v[2]] == l[v[3]]);
     if (on_rim) {
         const double voxel = points.voxel_m();
         const auto off = [&](const Vec3& p, const Vec3& q, const PrimitiveSet& common) {

@@ -55,7 +55,8 @@ private:
     bool in_cell(std::size_t v) const { return cell_box(v).contains(mesh_.positions[v]); }
 
     // extract_joins.cpp
-    bool join_near(std::span<const std::uint32_t> polygons, double near_m, std::size_t least_labels);
+    bool join_near(std::span<const std::uint32_t> polygons, double near_m,
+                   std::size_t least_labels);
     bool join(std::uint32_t v, std::uint32_t w);
 
     // extract_retreat.cpp

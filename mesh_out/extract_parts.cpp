@@ -41,7 +41,7 @@ public:
         : mesh_(mesh), field_(field), lattice_(lattice), voxel_m_(lattice.voxel_m),
           bound_m_(bound_vox * lattice.voxel_m), from_(from), n_before_(mesh.positions.size()) {}
 
-    /// Whether there were any.
+    /// \return whether there were any.
     bool run(Progress* progress) {
         find();
         if (parts_.empty())
@@ -75,7 +75,8 @@ private:
                         if (const auto part = of_edge(a, b))
                             found[chunk].push_back(*part);
                 }
-                if (const auto part = from_ > 0 ? std::nullopt : of_triangle(static_cast<std::uint32_t>(t)))
+                if (const auto part =
+                        from_ > 0 ? std::nullopt : of_triangle(static_cast<std::uint32_t>(t)))
                     found[chunk].push_back(*part);
             }
         });
@@ -178,8 +179,9 @@ private:
         }
         for (std::uint32_t t = 0; t < mesh_.triangles.size(); ++t) {
             const Triangle& corners = mesh_.triangles[t];
-            if (has_corner[t] || (is_end[corners[0]] + is_end[corners[1]] + is_end[corners[2]] > 1 &&
-                                  middles(corners) != Middles()))
+            if (has_corner[t] ||
+                (is_end[corners[0]] + is_end[corners[1]] + is_end[corners[2]] > 1 &&
+                 middles(corners) != Middles()))
                 parted_.push_back(t);
             else if (close.contains(coarse(mesh_.positions[corners[0]])))
                 near_.push_back(corners);
@@ -265,8 +267,8 @@ private:
             drop_at(faces[g]);
         }
         drop_close();
-        const auto end = std::remove_if(parts_.begin(), parts_.end(),
-                                        [](const Part& p) { return p.dropped; });
+        const auto end =
+            std::remove_if(parts_.begin(), parts_.end(), [](const Part& p) { return p.dropped; });
         const bool any = end != parts_.end();
         parts_.erase(end, parts_.end());
         return any;
@@ -287,10 +289,12 @@ private:
         });
         for (std::size_t v = 0; v < mesh_.positions.size(); ++v) {
             const Vec3& p = mesh_.positions[v];
-            auto at = std::lower_bound(order.begin(), order.end(), p.x - least_m,
-                                       [&](std::uint32_t a, double x) { return parts_[a].point.x < x; });
+            auto at =
+                std::lower_bound(order.begin(), order.end(), p.x - least_m,
+                                 [&](std::uint32_t a, double x) { return parts_[a].point.x < x; });
             for (; at != order.end() && parts_[*at].point.x <= p.x + least_m; ++at)
-                if (n_before_ + *at > v && length_squared(parts_[*at].point - p) < least_m * least_m)
+                if (n_before_ + *at > v &&
+                    length_squared(parts_[*at].point - p) < least_m * least_m)
                     parts_[*at].dropped = true;
         }
     }
@@ -300,10 +304,10 @@ private:
     const Lattice& lattice_;
     double voxel_m_, bound_m_;
     std::size_t from_, n_before_;
-    std::vector<Part> parts_; ///< ascending
-    std::vector<std::uint32_t> parted_;  ///< triangles
-    std::vector<Triangle> new_;          ///< what they become
-    std::vector<std::ptrdiff_t> first_;  ///< of new_, for each parted
+    std::vector<Part> parts_;           ///< ascending
+    std::vector<std::uint32_t> parted_; ///< triangles
+    std::vector<Triangle> new_;         ///< what they become
+    std::vector<std::ptrdiff_t> first_; ///< of new_, for each parted
     std::vector<Triangle> near_;
 };
 

@@ -137,10 +137,11 @@ std::vector<std::uint8_t> Mesher::untamed() const {
     tbb::parallel_for(tbb::blocked_range<std::size_t>(0, tame.size(), 1024), [&](const auto& r) {
         for (std::size_t v = r.begin(); v < r.end(); ++v) {
             const CellRef& cell = surface_.cell(v);
-            tame[v] = next_[v] == kNone &&
-                      cell_box(v).dilated(-kLeast * points_.voxel_m()).contains(mesh_.positions[v]) &&
-                      alternating_faces(blocks_[cell.block].corners(CellBlocks::local(cell.first),
-                                                                    cell.size)) == 0;
+            tame[v] =
+                next_[v] == kNone &&
+                cell_box(v).dilated(-kLeast * points_.voxel_m()).contains(mesh_.positions[v]) &&
+                alternating_faces(
+                    blocks_[cell.block].corners(CellBlocks::local(cell.first), cell.size)) == 0;
         }
     });
     tbb::parallel_for(tbb::blocked_range<std::size_t>(0, wild.size(), 1024), [&](const auto& r) {
@@ -198,8 +199,7 @@ bool Mesher::is_tame(std::size_t polygon) const {
 /// Aside of a rim, first, as little is often enough. Then into the cell, if it is outside; off the
 /// rim; to the middle of the crossings.
 void Mesher::step_back(const SurfacePoints& points, std::uint32_t v) {
-    static constexpr std::array<double, 3> kAside = {0.05, 0.2,
-                                                     0.6}; // of the way to the crossings
+    static constexpr std::array<double, 3> kAside = {0.05, 0.2, 0.6}; // of the way to the crossings
     const Box cell = cell_box(v);
     const auto crossings = crossings_of(v);
     const LabelledPoint start = points.place(crossings, cell, kSlack_vox * points.voxel_m());
@@ -322,8 +322,8 @@ Mesher::Vertices Mesher::in_one_place() const {
             const Vec3& q = mesh_.positions[order[k]];
             if (q.x - p.x > least_m)
                 break;
-            if (p == q || (length_squared(q - p) < least_m * least_m &&
-                           !share_polygon(order[i], order[k])))
+            if (p == q ||
+                (length_squared(q - p) < least_m * least_m && !share_polygon(order[i], order[k])))
                 hit.insert(hit.end(), {order[i], order[k]});
         }
     }

@@ -9,7 +9,8 @@ namespace {
 
 // In voxels.
 constexpr double kOnEdge = 1e-4, kOnSurface = 1e-3, kNearEnough = 0.05, kFarthest = 4;
-constexpr double kBesideFace = 0.02, kBesideEdge = 0.01, kMostStep = 0.05; // what a tangent is good for
+constexpr double kBesideFace = 0.02, kBesideEdge = 0.01,
+                 kMostStep = 0.05; // what a tangent is good for
 // Normals of one primitive that differ by more than 40 degrees in a cell: it has edges of its own.
 constexpr double kSmoothCosine = 0.77;
 
@@ -348,17 +349,18 @@ bool SurfacePoints::joins(const std::array<openvdb::Coord, 4>& corners) const {
     for (std::size_t k = 0; k < 4; ++k)
         v[k] = static_cast<double>(accessor_.getValue(corners[k]));
     const bool first_inside = v[0] < 0;
-    // Fins that voxels hardly resolve: the field knows.
+    const std::size_t in = first_inside ? 0 : 1, out = 1 - in;
     const auto all_along = [&](std::size_t k, bool inside) {
+        constexpr int kSteps = 8;
         const Vec3 from = voxel(corners[k]), way = voxel(corners[k + 2]) - from;
-        for (const double share : {0., 0.125, 0.25, 0.375, 0.5, 0.625, 0.75, 0.875, 1.})
-            if ((field_.at(from + way * share).value_m < 0) != inside)
+        for (int i = 0; i <= kSteps; ++i)
+            if ((field_.at(from + way * (double(i) / kSteps)).value_m < 0) != inside)
                 return false;
         return true;
     };
-    if (all_along(first_inside ? 0 : 1, true))
+    if (all_along(in, true))
         return true;
-    if (all_along(first_inside ? 1 : 0, false))
+    if (all_along(out, false))
         return false;
     return first_inside ? v[0] * v[2] > v[1] * v[3] : v[1] * v[3] > v[0] * v[2];
 }

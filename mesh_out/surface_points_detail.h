@@ -51,7 +51,8 @@ public:
     /// The face at a point.
     PrimitiveSet label(const Vec3& p) const { return PrimitiveSet(field_.at(p).primitive); }
     bool is_on(const Vec3& p) const;
-    /// Whether a face whose corners alternate joins those inside, by the saddle of its values.
+    /// Whether a face whose corners alternate joins those inside: where the field is inside, or
+    /// outside, all along one of its diagonals; else by the saddle of its values.
     /// \param corners  the voxels in their order around it.
     bool joins(const std::array<openvdb::Coord, 4>& corners) const;
 

@@ -133,6 +133,19 @@ TEST(ExtractField, IsSharpAndExactAtFullExtraction) {
     }
 }
 
+TEST(ExtractField, CutsNoRimOffAtTheTipsOfFins) {
+    for (const Sharp& s : sharp_solids())
+        for (const ExtractSettings& settings : {kFull, ExtractSettings{0.25, 4}}) {
+            SCOPED_TRACE(s.name);
+            const LabelledMesh mesh = extract(*grid_of(s), s.field.get(), settings);
+            std::size_t n_over_rims = 0;
+            for (const Triangle& t : mesh.triangles)
+                n_over_rims +=
+                    mesh.labels[t[0]].common(mesh.labels[t[1]]).common(mesh.labels[t[2]]).empty();
+            EXPECT_EQ(n_over_rims, 0u); // all lie on one primitive
+        }
+}
+
 TEST(ExtractField, StaysWithinItsBoundWhereCellsGrow) {
     for (const Sharp& s : sharp_solids()) {
         SCOPED_TRACE(s.name);
