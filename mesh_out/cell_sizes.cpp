@@ -105,9 +105,9 @@ void join(CellBlock& block, std::uint32_t number, const Bends& bends,
     // The chord of an arc is chord^2 / 8 times its bend off it; half of the bound for where the
     // cells' vertices are farther apart than their size.
     const auto may_join = [&](const Coord& c, int size, float bend) {
-        const std::uint64_t name = std::uint64_t{number} * 512 + CellBlocks::number(c);
         return static_cast<double>(bend) * size * size / 8 <= settings.bound_vox / 2 &&
-               is_simple(block, c, size) && !small.contains(name * 8 + unsigned(size));
+               is_simple(block, c, size) &&
+               !small.contains(small_cell({number, CellBlocks::number(c), 1}, size));
     };
     std::uint64_t passed = 0;
     for (unsigned i = 0; i < 64; ++i) {

@@ -21,12 +21,14 @@ struct ExtractSettings {
 /// the grid, the grid does.
 ///
 /// One vertex for each curve in which the surface passes the faces of a cell of an octree (1, 2 or
-/// 4 voxels, in blocks of 8), on the surface of the field: closed, 2-manifold, outward, no
-/// zero-area triangle, no two vertices in one place; of its topology nothing is lost against voxel
-/// cells. Cells beside rims and where surfaces come near each other stay small. Vertices whose
-/// triangles cross others step aside of their rim, or back into their cell, until none cross:
-/// looked for are crossings of triangles that left their cells, are steep, or lie on no one
-/// primitive. The same bytes on any number of threads.
+/// 4 voxels, in blocks of 8), on the surface of the field; those that come to one place on a rim or
+/// in a corner are one, and tips of fins that reach out of the cells get more. Closed, 2-manifold,
+/// outward, no zero-area triangle, no two vertices in one place; of its topology nothing is lost
+/// against voxel cells. Cells beside rims and where surfaces come near each other stay small.
+/// Vertices whose triangles cross others move along their rim or face to between their neighbours;
+/// where that does not help they step aside of their rim, or back into their cell, until none
+/// cross; what does to the last, in solids that voxels hardly resolve, is for the certificate to
+/// count. The same bytes on any number of threads.
 ///
 /// \param solid  level set: cubic voxels, negative inside, half band >= 2 voxels.
 /// \param field  what it was made of; null: the level set is its own.

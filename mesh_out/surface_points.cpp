@@ -9,7 +9,8 @@ namespace {
 
 // In voxels.
 constexpr double kOnEdge = 1e-4, kOnSurface = 1e-3, kNearEnough = 0.05, kFarthest = 4;
-constexpr double kBesideEdge = 0.01, kMostStep = 0.05; // what a tangent is good for
+constexpr double kBesideFace = 0.02, kBesideEdge = 0.01,
+                 kMostStep = 0.05; // what a tangent is good for
 // Normals of one primitive that differ by more than 40 degrees in a cell: it has edges of its own.
 constexpr double kSmoothCosine = 0.77;
 
@@ -159,7 +160,7 @@ LabelledPoint SurfacePoints::place(std::span<const Crossing> crossings, const Bo
                 return {in, set};
         }
     } else if (set.size() == 1) {
-        if (const auto p = beside(set[0], mean); p && cell.dilated(slack_m).contains(*p))
+        if (const auto p = beside(crossings, mean); p && cell.dilated(slack_m).contains(*p))
             return {*p, set};
     }
     if (set.size() == 2 && all_in)
@@ -173,14 +174,22 @@ LabelledPoint SurfacePoints::place(std::span<const Crossing> crossings, const Bo
     return on_face(mean, cell);
 }
 
-std::optional<Vec3> SurfacePoints::beside(Primitive primitive, const Vec3& p) const {
-    const FieldProbe::Value from = field_.of(primitive, p);
-    const Vec3 way = from.gradient / length_squared(from.gradient);
-    const Vec3 near = p - way * from.value_m;
-    const double left_m = field_.at(near).value_m;
-    if (!(std::fabs(left_m) <= kOnSurface * lattice_.voxel_m))
+std::optional<Vec3> SurfacePoints::beside(std::span<const Crossing> crossings,
+                                          const Vec3& mean) const {
+    Vec3 normal;
+    double off_m = 0;
+    for (const Crossing& c : crossings) {
+        normal += c.normal;
+        off_m += dot(c.normal, mean - c.point);
+    }
+    normal = normalized(normal);
+    // Of a quadric the mean is half as far off as it is off the tangents.
+    const Vec3 near = mean - normal * (off_m / (2 * static_cast<double>(crossings.size())));
+    const FieldProbe::Nearest there = field_.at(near);
+    if (there.primitive != crossings[0].primitive ||
+        !(std::fabs(there.value_m) <= kBesideFace * lattice_.voxel_m))
         return std::nullopt;
-    return near - way * left_m;
+    return near - normal * there.value_m;
 }
 
 std::optional<LabelledPoint> SurfacePoints::on_rim(const PrimitiveSet& set, const Vec3& from,
@@ -340,6 +349,19 @@ bool SurfacePoints::joins(const std::array<openvdb::Coord, 4>& corners) const {
     for (std::size_t k = 0; k < 4; ++k)
         v[k] = static_cast<double>(accessor_.getValue(corners[k]));
     const bool first_inside = v[0] < 0;
+    const std::size_t in = first_inside ? 0 : 1, out = 1 - in;
+    const auto all_along = [&](std::size_t k, bool inside) {
+        constexpr int kSteps = 8;
+        const Vec3 from = voxel(corners[k]), way = voxel(corners[k + 2]) - from;
+        for (int i = 0; i <= kSteps; ++i)
+            if ((field_.at(from + way * (double(i) / kSteps)).value_m < 0) != inside)
+                return false;
+        return true;
+    };
+    if (all_along(in, true))
+        return true;
+    if (all_along(out, false))
+        return false;
     return first_inside ? v[0] * v[2] > v[1] * v[3] : v[1] * v[3] > v[0] * v[2];
 }
 

@@ -51,15 +51,15 @@ public:
     /// The face at a point.
     PrimitiveSet label(const Vec3& p) const { return PrimitiveSet(field_.at(p).primitive); }
     bool is_on(const Vec3& p) const;
-    /// Whether a face whose corners alternate joins those inside, by the saddle of its values.
+    /// Whether a face whose corners alternate joins those inside: where the field is inside, or
+    /// outside, all along one of its diagonals; else by the saddle of its values.
     /// \param corners  the voxels in their order around it.
     bool joins(const std::array<openvdb::Coord, 4>& corners) const;
 
 private:
     Crossing found_on_edge(const openvdb::Coord& voxel, int axis) const;
-    /// The nearest point of one primitive, from near it: two steps; none where it is not that of
-    /// the field.
-    std::optional<Vec3> beside(Primitive primitive, const Vec3& p) const;
+    /// The point of a face near the mean of its crossings; none where that is far off.
+    std::optional<Vec3> beside(std::span<const Crossing> crossings, const Vec3& mean) const;
     std::optional<LabelledPoint> settle(PrimitiveSet set, const Vec3& from, const Box& cell,
                                         double slack_m) const;
     /// The middle of a rim that passes two faces of the cell between crossings.
