@@ -32,6 +32,7 @@ constexpr std::size_t kFewCrossings = 40; ///< that are better parted than round
 constexpr double kMostBeyond = 0.01;      ///< share of samples over a bound that is held at all
 constexpr double kGrown = 0.25;           ///< of a bound, for walls that coarser voxels would lose
 constexpr double kShut = 0.5;            ///< of a bound: what lies deeper in a grown solid was shut
+constexpr double kAlike = 0.5;           ///< cosine of the angle between normals of the same place
 constexpr double kFewBeyondGrown = 1e-3; ///< as kFewBeyond, of levels on coarser voxels
 constexpr double kShrink = 0.68, kLeastShrink = 1. / 3; ///< of levels, as Chain::shrink_
 constexpr int kCoarsest = 8;                            ///< voxels along one of a level's own
@@ -95,6 +96,7 @@ private:
         std::vector<Vec3> beyond, crossings;
         std::size_t n_samples = 0;
     };
+    std::vector<Vec3> normals(const LabelledMesh& mesh) const;
     TriMesh snapped(const BoundedMesh& mesh, double bound_m, double most_m,
                     PositionGrid& grid) const;
     Written written(const BoundedMesh& mesh, double bound_m, double move_m) const;
@@ -231,11 +233,24 @@ BoundedSimplifier Chain::simplifier(LabelledMesh surface) const {
             BoundedSettings{.spacing_m = model_.spacing_m, .few_crossings = kFewCrossings}};
 }
 
+/// The field's, but where holes were shut.
+std::vector<Vec3> Chain::normals(const LabelledMesh& mesh) const {
+    std::vector<Vec3> out = surface_normals(mesh, *model_.probe);
+    if (!model_.own)
+        return out;
+    tbb::parallel_for(std::size_t{0}, out.size(), [&](std::size_t v) {
+        const Vec3& p = mesh.positions[v];
+        const Vec3 sharp = truth_->of(truth_->at(p).primitive, p).gradient;
+        if (dot(sharp, out[v]) > kAlike * length(sharp))
+            out[v] = normalized(sharp);
+    });
+    return out;
+}
+
 /// On the coarsest position grid of the chain on which no faces cross.
 TriMesh Chain::snapped(const BoundedMesh& mesh, double bound_m, double most_m,
                        PositionGrid& grid) const {
-    const TriMesh plain{mesh.mesh.positions, mesh.mesh.triangles,
-                        surface_normals(mesh.mesh, *model_.probe)};
+    const TriMesh plain{mesh.mesh.positions, mesh.mesh.triangles, normals(mesh.mesh)};
     const Box box = box_.dilated(std::min(bound_m, box_.longest())); // balanced vertices lie off
     const double least_m =
         std::max(kLeastMove * most_m, 1.001 * finest_grid(box).step_m * std::sqrt(3.0) / 2);

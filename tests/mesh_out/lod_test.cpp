@@ -253,16 +253,16 @@ struct Sponge {
     openvdb::FloatGrid::Ptr grid;
 
     Sponge()
-        : holes(made()), field(std::make_shared<BallsField>(std::vector<Sphere>{{{0, 0, 0}, 1}}),
+        : holes(made()), field(std::make_shared<BallsField>(std::vector<Sphere>{{{0, 0, 0}, 0.8}}),
                                std::make_shared<BallsField>(holes)),
           grid(clean(*rasterize(field, {kVoxel, {}, 3})).solid) {}
     static std::vector<Sphere> made() {
         const Rng rng{.seed = 3, .stream = 1};
         std::vector<Sphere> holes;
-        for (std::uint64_t i = 0; i < 260; ++i)
-            holes.push_back(
-                {Vec3{rng.uniform(i, 0), rng.uniform(i, 1), rng.uniform(i, 2)} * 2 - Vec3{1, 1, 1},
-                 (2 + 2.5 * rng.uniform(i, 3)) * kVoxel});
+        for (std::uint64_t i = 0; i < 130; ++i)
+            holes.push_back({Vec3{rng.uniform(i, 0), rng.uniform(i, 1), rng.uniform(i, 2)} * 1.6 -
+                                 Vec3{1, 1, 1} * 0.8,
+                             (2 + 2.5 * rng.uniform(i, 3)) * kVoxel});
         return holes;
     }
 };
