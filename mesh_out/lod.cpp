@@ -176,7 +176,7 @@ void Chain::use_field(double bound_m) {
 /// bound, or on the solid's own. False where the bound is too small for that, or so large that
 /// nothing is left.
 bool Chain::use_coarser(double bound_m, LabelledMesh& surface) {
-    if (bound_m < voxel_m_ || bound_m > box_.longest() / 8)
+    if (bound_m < voxel_m_ || bound_m > box_.longest() / 4)
         return false;
     int coarser = 1;
     while (coarser < kCoarsest && 4 * coarser * voxel_m_ <= bound_m * (1 + 1e-9))
@@ -204,22 +204,26 @@ bool Chain::use_coarser(double bound_m, LabelledMesh& surface) {
 void Chain::drop_shut(double bound_m, const LabelledMesh& surface) {
     const SurfaceDistance to_surface({surface.positions, surface.triangles, {}});
     const double deep_m = model_.off_m + kShut * bound_m;
-    std::vector<std::uint8_t> shut(reference_.positions.size());
+    enum : std::uint8_t { kHeld, kFilled, kWay };
+    std::vector<std::uint8_t> shut(reference_.positions.size(), kHeld);
     tbb::parallel_for(std::size_t{0}, shut.size(), [&](std::size_t v) {
         const Vec3& p = reference_.positions[v];
-        shut[v] = model_.probe->at(p).value_m < 0 && to_surface(p) > deep_m;
+        if (!(model_.probe->at(p).value_m < 0) || to_surface(p) <= deep_m)
+            return;
+        const bool is_filled =
+            std::any_of(model_.closed.begin(), model_.closed.end(), [&](const Sphere& s) {
+                return length(p - s.center) <= s.radius_m + bound_m;
+            });
+        shut[v] = is_filled ? kFilled : kWay;
     });
     std::vector<std::uint32_t> renamed(shut.size());
-    std::vector<Vec3> ways; // that were shut, but for those into what was filled
+    std::vector<Vec3> ways; // into what was not filled
     for (std::size_t v = 0; v < shut.size(); ++v) {
-        const Vec3& p = reference_.positions[v];
         renamed[v] = static_cast<std::uint32_t>(model_.held.positions.size());
-        if (!shut[v])
-            model_.held.positions.push_back(p);
-        else if (std::none_of(model_.closed.begin(), model_.closed.end(), [&](const Sphere& s) {
-                     return length(p - s.center) <= s.radius_m + bound_m;
-                 }))
-            ways.push_back(p);
+        if (shut[v] == kHeld)
+            model_.held.positions.push_back(reference_.positions[v]);
+        if (shut[v] == kWay)
+            ways.push_back(reference_.positions[v]);
     }
     for (const Triangle& t : reference_.triangles)
         if (!shut[t[0]] && !shut[t[1]] && !shut[t[2]])
