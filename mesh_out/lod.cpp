@@ -9,14 +9,17 @@
 #include <optional>
 #include <utility>
 
-#include <nlohmann/json.hpp>
+#include <tbb/parallel_for.h>
 
 #include "mesh_out/crossings_detail.h"
 #include "mesh_out/extract.h"
 #include "mesh_out/field_distance.h"
+#include "mesh_out/lost_surface_detail.h"
 #include "mesh_out/openness.h"
 #include "mesh_out/part_sheets_detail.h"
+#include "mesh_out/surface_distance.h"
 #include "stats/core/error.h"
+#include "vdb_ops/coarser_solid.h"
 #include "vdb_ops/placed_level_set_field.h"
 #include "vdb_ops/rasterize.h"
 
@@ -28,9 +31,14 @@ constexpr double kTightest = 0.9;      ///< by how much one more attempt may low
 constexpr double kFewBeyond = 2e-5;    ///< share of samples over a bound that are named, not mended
 constexpr std::size_t kFewCrossings = 40; ///< that are better parted than rounded less
 constexpr double kMostBeyond = 0.01;      ///< share of samples over a bound that is held at all
-constexpr double kLeastMove = 1.0 / 16;   ///< of what rounding may take, where faces would cross
+constexpr double kGrown = 0.25;           ///< of a bound, for walls that coarser voxels would lose
+constexpr double kShut = 0.5;            ///< of a bound: what lies deeper in a grown solid was shut
+constexpr double kAlike = 0.5;           ///< cosine of the angle between normals of the same place
+constexpr double kFewBeyondGrown = 1e-3; ///< as kFewBeyond, of levels on coarser voxels
+constexpr double kShrink = 0.68, kLeastShrink = 1. / 3; ///< of levels, as Chain::shrink_
+constexpr int kCoarsest = 8;                            ///< voxels along one of a level's own
+constexpr double kLeastMove = 1.0 / 16; ///< of what rounding may take, where faces would cross
 constexpr int kAttempts = 2, kMostLevels = 8, kMostBits = 18;
-constexpr int kReportVersion = 1;
 
 std::string shown(double value) {
     char text[32];
@@ -80,32 +88,56 @@ private:
     double max_move_m(double bound_m) const {
         return std::min(kRoundingShare * bound_m, box_.longest() / 16);
     }
-    /// From the last level, with probes for a level of this bound.
-    BoundedSimplifier simplifier(double bound_m);
+    void use_field(double bound_m);
+    bool use_coarser(double bound_m, LabelledMesh& surface);
+    BoundedSimplifier simplifier(LabelledMesh surface) const;
     /// A level, and where it is not what it should be.
     struct Written {
         LodLevel level;
         std::vector<Vec3> beyond, crossings;
         std::size_t n_samples = 0;
     };
+    std::vector<Vec3> normals(const LabelledMesh& mesh) const;
     TriMesh snapped(const BoundedMesh& mesh, double bound_m, double most_m,
                     PositionGrid& grid) const;
+    void name_lost(LodLevel& level) const;
     Written written(const BoundedMesh& mesh, double bound_m, double move_m) const;
     std::vector<Sphere> around(const std::vector<Vec3>& points, double radius_m) const;
-    bool within(double bound_m, LodLevel& level);
+    bool simplified(double bound_m, LabelledMesh& surface, LodLevel& level) const;
+    bool within(double bound_m, const LodLevel* before, LodLevel& level);
     bool of_triangles(std::size_t n, LodLevel& level, std::string& why);
 
+    /// What a level is simplified against: the field, or a level set made for it.
+    struct Model {
+        std::unique_ptr<const Field> own;
+        double spacing_m = 0;
+        double off_m = 0; ///< from the solid's surface, where nothing was shut
+        std::vector<Sphere> closed;
+        std::shared_ptr<const FieldProbe> probe;  ///< as far as this level needs distances
+        std::shared_ptr<const FieldProbe> around; ///< as far as its faces are long
+        TriMesh held; ///< the part of the reference that was not shut; all of it when empty
+    };
+    std::shared_ptr<const FieldProbe> probe(const Field& field, double reach_m) const {
+        return field.probe(box_.dilated(reach_m), reach_m);
+    }
+    const TriMesh& held() const { return model_.held.triangles.empty() ? reference_ : model_.held; }
+    void drop_shut(double bound_m, const LabelledMesh& surface);
+
+    const openvdb::FloatGrid& solid_;
     const LodSettings& settings_;
     Progress* progress_;
     const double voxel_m_;
     std::unique_ptr<const Field> own_; ///< where none was given
     const Field* field_;
     TriMesh reference_;
+    std::vector<Vec3> lost_; ///< on the field's surface, where the level set may not see it
     Box box_;
     double origin_step_m_ = 0;
-    LabelledMesh last_;                        ///< as the last level left it, on the surface
-    std::unique_ptr<const FieldProbe> probe_;  ///< as far as this level needs distances
-    std::unique_ptr<const FieldProbe> around_; ///< as far as its faces are long
+    LabelledMesh last_; ///< as the last level of the field left it, on the surface
+    Model model_;
+    std::shared_ptr<const FieldProbe> truth_; ///< of the field
+    bool is_coarse_ = false;                  ///< the last level was made on coarser voxels
+    double shrink_ = 1; ///< of the last level of the field: -log n / log bound
 };
 
 /// The finest bound that is asked for; a fraction of a voxel where only triangles are.
@@ -116,7 +148,8 @@ double Chain::finest_bound_m() const {
 
 Chain::Chain(const openvdb::FloatGrid& solid, const Field* field, const LodSettings& settings,
              Progress* progress)
-    : settings_(settings), progress_(progress), voxel_m_(lattice_of(solid).voxel_m), field_(field) {
+    : solid_(solid), settings_(settings), progress_(progress), voxel_m_(lattice_of(solid).voxel_m),
+      field_(field) {
     report_stage(progress, "extracting the surface");
     const double bound_vox = std::clamp(2 * finest_bound_m() / voxel_m_, 0.05, 1.0);
     last_ = extract(solid, field, {.bound_vox = bound_vox}, progress);
@@ -131,24 +164,102 @@ Chain::Chain(const openvdb::FloatGrid& solid, const Field* field, const LodSetti
     if (!field) {
         own_ = std::make_unique<PlacedLevelSetField>(solid.copy()); // its band may be widened
         field_ = own_.get();
+    } else {
+        lost_ = lost_surface(solid, *probe(*field, 2 * voxel_m_), progress);
     }
 }
 
-BoundedSimplifier Chain::simplifier(double bound_m) {
-    const auto probe = [&](double reach_m) {
-        return field_->probe(box_.dilated(reach_m), reach_m);
-    };
-    around_ = probe(8 * voxel_m_ + 5.5 * bound_m);
-    probe_ = probe(2 * (voxel_m_ + bound_m));
-    return {last_, *around_,
-            BoundedSettings{.spacing_m = voxel_m_, .few_crossings = kFewCrossings}};
+void Chain::use_field(double bound_m) {
+    model_ = {};
+    model_.spacing_m = voxel_m_;
+    model_.around = probe(*field_, 8 * voxel_m_ + 5.5 * bound_m); // the wider one first
+    truth_ = probe(*field_, 2 * (voxel_m_ + bound_m));
+    model_.probe = truth_;
+}
+
+/// For levels that see fewer rims and holes than the field has: grown on voxels half as wide as the
+/// bound, or on the solid's own. False where the bound is too small for that, or so large that
+/// nothing is left.
+bool Chain::use_coarser(double bound_m, LabelledMesh& surface) {
+    if (bound_m < voxel_m_ || bound_m > box_.longest() / 4)
+        return false;
+    int coarser = 1;
+    while (coarser < kCoarsest && 4 * coarser * voxel_m_ <= bound_m * (1 + 1e-9))
+        coarser *= 2;
+    Model model;
+    model.spacing_m = coarser * voxel_m_;
+    model.off_m = std::min(kGrown * bound_m, model.spacing_m);
+    CoarserSolid coarse =
+        coarser_solid(solid_, {.coarser = coarser, .grow_m = model.off_m}, progress_);
+    if (!coarse.solid)
+        return false;
+    const double bound_vox = std::clamp(0.3 * bound_m / model.spacing_m, 0.05, 1.0);
+    surface = extract(*coarse.solid, nullptr, {.bound_vox = bound_vox}, progress_);
+    model.own = std::make_unique<PlacedLevelSetField>(coarse.solid);
+    model.closed = std::move(coarse.closed);
+    truth_ = probe(*field_, 2 * (voxel_m_ + bound_m));
+    model.around = probe(*model.own, 8 * model.spacing_m + 5.5 * bound_m);
+    model.probe = model.around;
+    model_ = std::move(model);
+    drop_shut(bound_m, surface);
+    return true;
+}
+
+/// What was shut is not held to the bound, but named.
+void Chain::drop_shut(double bound_m, const LabelledMesh& surface) {
+    const SurfaceDistance to_surface({surface.positions, surface.triangles, {}});
+    const double deep_m = model_.off_m + kShut * bound_m;
+    enum : std::uint8_t { kHeld, kFilled, kWay };
+    std::vector<std::uint8_t> shut(reference_.positions.size(), kHeld);
+    tbb::parallel_for(std::size_t{0}, shut.size(), [&](std::size_t v) {
+        const Vec3& p = reference_.positions[v];
+        if (!(model_.probe->at(p).value_m < 0) || to_surface(p) <= deep_m)
+            return;
+        const bool is_filled =
+            std::any_of(model_.closed.begin(), model_.closed.end(), [&](const Sphere& s) {
+                return length(p - s.center) <= s.radius_m + bound_m;
+            });
+        shut[v] = is_filled ? kFilled : kWay;
+    });
+    std::vector<std::uint32_t> renamed(shut.size());
+    std::vector<Vec3> ways; // into what was not filled
+    for (std::size_t v = 0; v < shut.size(); ++v) {
+        renamed[v] = static_cast<std::uint32_t>(model_.held.positions.size());
+        if (shut[v] == kHeld)
+            model_.held.positions.push_back(reference_.positions[v]);
+        if (shut[v] == kWay)
+            ways.push_back(reference_.positions[v]);
+    }
+    for (const Triangle& t : reference_.triangles)
+        if (!shut[t[0]] && !shut[t[1]] && !shut[t[2]])
+            model_.held.triangles.push_back({renamed[t[0]], renamed[t[1]], renamed[t[2]]});
+    const std::vector<Sphere> more = around(ways, bound_m);
+    model_.closed.insert(model_.closed.end(), more.begin(), more.end());
+}
+
+BoundedSimplifier Chain::simplifier(LabelledMesh surface) const {
+    return {std::move(surface), *model_.around,
+            BoundedSettings{.spacing_m = model_.spacing_m, .few_crossings = kFewCrossings}};
+}
+
+/// The field's, but where holes were shut.
+std::vector<Vec3> Chain::normals(const LabelledMesh& mesh) const {
+    std::vector<Vec3> out = surface_normals(mesh, *model_.probe);
+    if (!model_.own)
+        return out;
+    tbb::parallel_for(std::size_t{0}, out.size(), [&](std::size_t v) {
+        const Vec3& p = mesh.positions[v];
+        const Vec3 sharp = truth_->of(truth_->at(p).primitive, p).gradient;
+        if (dot(sharp, out[v]) > kAlike * length(sharp))
+            out[v] = normalized(sharp);
+    });
+    return out;
 }
 
 /// On the coarsest position grid of the chain on which no faces cross.
 TriMesh Chain::snapped(const BoundedMesh& mesh, double bound_m, double most_m,
                        PositionGrid& grid) const {
-    const TriMesh plain{mesh.mesh.positions, mesh.mesh.triangles,
-                        surface_normals(mesh.mesh, *probe_)};
+    const TriMesh plain{mesh.mesh.positions, mesh.mesh.triangles, normals(mesh.mesh)};
     const Box box = box_.dilated(std::min(bound_m, box_.longest())); // balanced vertices lie off
     const double least_m =
         std::max(kLeastMove * most_m, 1.001 * finest_grid(box).step_m * std::sqrt(3.0) / 2);
@@ -172,12 +283,33 @@ TriMesh Chain::snapped(const BoundedMesh& mesh, double bound_m, double most_m,
     }
 }
 
+/// Fins and slits of which the voxels show nothing, nor the mesh.
+void Chain::name_lost(LodLevel& level) const {
+    if (lost_.empty())
+        return;
+    const SurfaceDistance to_mesh(level.encoded.decoded);
+    std::vector<double> off_m(lost_.size());
+    tbb::parallel_for(std::size_t{0}, lost_.size(),
+                      [&](std::size_t i) { off_m[i] = to_mesh(lost_[i]); });
+    std::vector<Vec3> beyond;
+    double most_m = 0;
+    for (std::size_t i = 0; i < lost_.size(); ++i)
+        if (off_m[i] > level.bound_m) {
+            beyond.push_back(lost_[i]);
+            most_m = std::max(most_m, off_m[i]);
+        }
+    for (const Sphere& ball : around(beyond, 2 * voxel_m_))
+        level.unresolved.push_back({ball.center, ball.radius_m, most_m});
+    level.unresolved_error_m = most_m;
+}
+
 /// `mesh` as a file holds it: snapped, coded, decoded; certified and measured as decoded.
 Chain::Written Chain::written(const BoundedMesh& mesh, double bound_m, double move_m) const {
     Written out;
     LodLevel& level = out.level;
     level.bound_m = bound_m;
     level.unresolved = mesh.unresolved;
+    level.closed = model_.closed;
     TriMesh mesh_on_grid = snapped(mesh, bound_m, move_m, level.grid);
     if (settings_.openness)
         mesh_on_grid.openness = openness(mesh_on_grid, {}, progress_);
@@ -197,15 +329,16 @@ Chain::Written Chain::written(const BoundedMesh& mesh, double bound_m, double mo
             for (const std::uint32_t v : decoded.triangles[f])
                 out.crossings.push_back(decoded.positions[v]);
     check_cancelled(progress_);
+    name_lost(level);
     std::vector<Sphere> apart;
-    for (const UnresolvedPlace& place : mesh.unresolved)
+    for (const UnresolvedPlace& place : level.unresolved)
         apart.push_back({place.center, place.radius_m + bound_m});
     // Every face has a few samples; it was certified before it was rounded.
     FieldDistance distance = field_distance(
-        decoded, *probe_, reference_, std::max(voxel_m_, 0.5 * bound_m), bound_m, apart, progress_);
+        decoded, *truth_, held(), std::max(voxel_m_, 0.5 * bound_m), bound_m, apart, progress_);
     level.error_m = distance.max_m;
     level.rms_m = distance.rms_m;
-    level.unresolved_error_m = distance.max_apart_m;
+    level.unresolved_error_m = std::max(level.unresolved_error_m, distance.max_apart_m);
     out.beyond = std::move(distance.beyond);
     out.n_samples = distance.n_samples;
     return out;
@@ -226,19 +359,20 @@ std::vector<Sphere> Chain::around(const std::vector<Vec3>& points, double radius
     return balls;
 }
 
-/// A level within a bound, from the one before: where it does not hold as decoded, or faces cross,
-/// what was there before stays. What no attempt mends is named. Returns false, and what was nearest
-/// to it in `level`, when that is nearly everywhere.
-bool Chain::within(double bound_m, LodLevel& level) {
-    const BoundedSimplifier start = simplifier(bound_m);
-    double inner_m = bound_m - max_move_m(bound_m);
+/// A level within a bound from a surface, which it leaves as its own: where it does not hold as
+/// decoded, or faces cross, what was there before stays. What no attempt mends is named. Returns
+/// false, and what was nearest to it in `level`, when that is nearly everywhere.
+bool Chain::simplified(double bound_m, LabelledMesh& surface, LodLevel& level) const {
+    const BoundedSimplifier start = simplifier(std::move(surface));
+    const double few = model_.own ? kFewBeyondGrown : kFewBeyond;
+    double inner_m = bound_m - max_move_m(bound_m) - model_.off_m;
     std::vector<Sphere> kept;
     for (int attempt = 0;; ++attempt) {
         BoundedSimplifier next = start;
         Written out = written(next.within(inner_m, kept, progress_), bound_m, max_move_m(bound_m));
         level = std::move(out.level);
         const double share = double(out.beyond.size()) / double(out.n_samples);
-        const bool last = attempt + 1 == kAttempts || share <= kFewBeyond;
+        const bool last = attempt + 1 == kAttempts || share <= few;
         if (last && share <= kMostBeyond) {
             for (const Sphere& ball : around(out.beyond, 2 * voxel_m_))
                 level.unresolved.push_back({ball.center, ball.radius_m, level.error_m});
@@ -246,11 +380,13 @@ bool Chain::within(double bound_m, LodLevel& level) {
             level.error_m = std::min(level.error_m, bound_m);
         }
         if (level.error_m <= bound_m && (attempt + 1 == kAttempts || out.crossings.empty())) {
-            last_ = next.surface();
+            surface = next.surface();
             return true;
         }
-        if (attempt + 1 == kAttempts)
+        if (attempt + 1 == kAttempts) {
+            surface = start.surface();
             return false;
+        }
         if (share > kMostBeyond)
             inner_m *= std::max(kTightest, 0.97 * bound_m / level.error_m);
         out.beyond.insert(out.beyond.end(), out.crossings.begin(), out.crossings.end());
@@ -259,10 +395,43 @@ bool Chain::within(double bound_m, LodLevel& level) {
     }
 }
 
+/// A level within a bound: by the field from the one before, sharp; or, where its rims and holes
+/// leave too many triangles, on coarser voxels. \param before  the level before, or null.
+bool Chain::within(double bound_m, const LodLevel* before, LodLevel& level) {
+    // On the solid's own voxels it takes long: only where there is little else.
+    const bool is_quick = bound_m >= 4 * voxel_m_;
+    bool made = false;
+    if (!is_coarse_ && !(is_quick && shrink_ < kShrink)) {
+        use_field(bound_m);
+        made = simplified(bound_m, last_, level);
+        if (made && before)
+            shrink_ = std::log(double(before->certificate.n_triangles) /
+                               double(level.certificate.n_triangles)) /
+                      std::log(bound_m / before->bound_m);
+        if (made &&
+            (before ? shrink_ >= (is_quick ? kShrink : kLeastShrink) : bound_m < 2 * voxel_m_))
+            return true;
+    }
+    LabelledMesh surface;
+    LodLevel coarse;
+    if (use_coarser(bound_m, surface) && simplified(bound_m, surface, coarse) &&
+        (!made || coarse.certificate.n_triangles < level.certificate.n_triangles)) {
+        level = std::move(coarse);
+        is_coarse_ = true;
+        return true;
+    }
+    if (!made) {
+        use_field(bound_m);
+        made = simplified(bound_m, last_, level);
+    }
+    return made;
+}
+
 /// A level of so many triangles, whatever its bound then is. Returns false, and why, when there is
 /// none.
 bool Chain::of_triangles(std::size_t n, LodLevel& level, std::string& why) {
-    BoundedSimplifier start = simplifier(box_.longest() / 16);
+    use_field(box_.longest() / 16);
+    BoundedSimplifier start = simplifier(last_);
     BoundedMesh mesh;
     try {
         mesh = start.to_triangles(n, progress_);
@@ -294,7 +463,7 @@ LodChain Chain::make() {
         if (goal.n_triangles > 0)
             made = of_triangles(goal.n_triangles, level, why);
         else
-            made = within(goal.bound_m, level);
+            made = within(goal.bound_m, j > 0 ? &chain.levels.back() : nullptr, level);
         if (!why.empty() && j > 0) {
             chain.note = std::to_string(j) + " of " + std::to_string(n) + " levels: " + why;
             break;
@@ -323,97 +492,10 @@ LodChain Chain::make() {
 
 } // namespace
 
-std::vector<LodGoal> bounds_by_factor(int n_levels, double bound_m, double factor) {
-    std::vector<LodGoal> goals;
-    for (int j = 0; j < n_levels; ++j)
-        goals.push_back({bound_m * std::pow(factor, j), 0});
-    return goals;
-}
-
-std::vector<double> screen_coverages(const LodChain& chain) {
-    std::vector<double> coverages;
-    constexpr double kPixels = 1920.0 * 1080.0, kCull = 1e-4;
-    for (std::size_t j = 0; j < chain.levels.size(); ++j) {
-        double coverage = kCull;
-        if (j + 1 < chain.levels.size()) {
-            const Vec3 size = chain.levels[j].certificate.box.size();
-            const double face_m2 = std::max({size.x * size.y, size.y * size.z, size.z * size.x});
-            const double pixel_m = chain.levels[j + 1].error_m;
-            coverage = std::min(1.0, face_m2 / (pixel_m * pixel_m * kPixels));
-        }
-        coverages.push_back(j == 0 ? coverage : std::min(coverage, coverages.back() / 2));
-    }
-    return coverages;
-}
-
 LodChain make_lods(const openvdb::FloatGrid& solid, const Field* field, const LodSettings& settings,
                    Progress* progress) {
     require(settings);
     return Chain(solid, field, settings, progress).make();
-}
-
-std::string format_glb(const LodChain& chain, const GlbSettings& settings) {
-    const std::vector<double> coverages = screen_coverages(chain);
-    std::vector<EncodedLevel> levels;
-    for (std::size_t j = 0; j < chain.levels.size(); ++j) {
-        levels.push_back(chain.levels[j].encoded);
-        levels.back().screen_coverage = coverages[j];
-    }
-    return format_glb(levels, settings);
-}
-
-namespace {
-
-/// The largest of them: thousands help nobody.
-nlohmann::ordered_json places_json(std::vector<UnresolvedPlace> places) {
-    constexpr std::size_t kMost = 100;
-    std::stable_sort(places.begin(), places.end(),
-                     [](const auto& a, const auto& b) { return a.radius_m > b.radius_m; });
-    auto json = nlohmann::ordered_json{{"n", places.size()}, {"largest", nlohmann::json::array()}};
-    for (std::size_t i = 0; i < std::min(kMost, places.size()); ++i) {
-        const Vec3& c = places[i].center;
-        json["largest"].push_back(
-            {{"center_m", {c.x, c.y, c.z}}, {"radius_m", places[i].radius_m}});
-    }
-    return json;
-}
-
-} // namespace
-
-std::string format_report(const LodChain& chain, const std::string& file) {
-    const std::vector<double> coverages = screen_coverages(chain);
-    nlohmann::ordered_json report;
-    report["taihu_report"] = kReportVersion;
-    report["file"] = file;
-    report["reference"] =
-        "surface of the field, or of the level set where there is none; distances by closest "
-        "point, both ways, on the decoded meshes, outside of the places listed";
-    report["n_reference_triangles"] = chain.n_reference_triangles;
-    report["note"] = chain.note;
-    report["levels"] = nlohmann::ordered_json::array();
-    for (std::size_t j = 0; j < chain.levels.size(); ++j) {
-        const LodLevel& level = chain.levels[j];
-        const Certificate& c = level.certificate;
-        report["levels"].push_back({{"triangles", c.n_triangles},
-                                    {"bytes", level.encoded.draco.size()},
-                                    {"error_m", level.error_m},
-                                    {"bound_m", level.bound_m},
-                                    {"rms_m", level.rms_m},
-                                    {"genus", c.genus},
-                                    {"holes_closed", level.holes_closed},
-                                    {"screen_coverage", coverages[j]},
-                                    {"vertices", c.n_vertices},
-                                    {"components", c.n_components},
-                                    {"cavities", c.n_cavities},
-                                    {"volume_m3", c.volume_m3},
-                                    {"area_m2", c.area_m2},
-                                    {"n_self_intersections", c.n_self_intersections},
-                                    {"position_step_m", level.grid.step_m},
-                                    {"position_bits", level.grid.bits},
-                                    {"unresolved", places_json(level.unresolved)},
-                                    {"unresolved_error_m", level.unresolved_error_m}});
-    }
-    return report.dump(2) + "\n";
 }
 
 } // namespace taihu

@@ -10,6 +10,7 @@
 #include "mesh_out/io/glb.h"
 #include "mesh_out/position_grid.h"
 #include "stats/core/progress.h"
+#include "stats/core/sphere.h"
 #include "stats/core/tri_mesh.h"
 #include "vdb_ops/field.h"
 
@@ -35,10 +36,13 @@ struct LodLevel {
     PositionGrid grid;
     Certificate certificate; ///< of the decoded mesh
     double bound_m = 0;      ///< promised: error_m <= bound_m
-    double error_m = 0;      ///< measured on the decoded mesh, both ways, outside `unresolved`
+    double error_m = 0;      ///< measured as decoded, both ways, off `closed` and `unresolved`
     double rms_m = 0;
     std::int64_t holes_closed = 0; ///< tunnels of level 0 that this level lacks
-    /// Walls and slits thinner than a voxel, where no bound is promised.
+    /// What it closed on purpose: balls in the voids that it fills, and round ways that it shuts.
+    /// What it lacks lies within `bound_m` of them.
+    std::vector<Sphere> closed;
+    /// Walls and slits thinner than a voxel, spikes and creases, where no bound is promised.
     std::vector<UnresolvedPlace> unresolved;
     double unresolved_error_m = 0; ///< measured there
 };
@@ -51,12 +55,17 @@ struct LodChain {
 
 /// Levels of detail of a solid under world-space bounds, sharp where primitives of the field meet.
 /// Each is simplified from the one before under a bound of its true distance to the field's
-/// surface, moved onto its position grid, Draco-coded, decoded, certified and measured; a level
-/// that misses its bound is made again with a tighter inner one. Normals are the field's. The same
-/// bytes on any number of threads. \param solid  level set [m], negative inside. \param field  what
-/// it was made of; null: the level set is its own. \throws Error bad_argument; numeric: the bound
-/// cannot be met (the message says what can), or a level that would break the certificate;
-/// cancelled.
+/// surface. Where that leaves too many triangles, as small holes and their rims do, a level whose
+/// bound is a voxel or more is made of coarser_solid() instead: voxels half as wide as the bound,
+/// at least the solid's own; grown by a quarter of the bound, so that no wall is lost; without
+/// ways narrower than half of it, and what lies behind them. Later levels are then made so, too.
+/// What was closed is named. A level is moved onto its position grid, Draco-coded, decoded,
+/// certified and measured; a level that misses its bound is made again with a tighter inner one.
+/// Normals are those of what it was made of. The same bytes on any number of threads.
+/// \param solid  level set [m], negative inside.
+/// \param field  what it was made of; null: the level set is its own.
+/// \throws Error bad_argument; numeric: the bound cannot be met (the message says what can), or a
+///   level that would break the certificate; cancelled.
 LodChain make_lods(const openvdb::FloatGrid& solid, const Field* field, const LodSettings& settings,
                    Progress* progress = nullptr);
 
@@ -70,7 +79,7 @@ std::vector<double> screen_coverages(const LodChain& chain);
 std::string format_glb(const LodChain& chain, const GlbSettings& settings = {});
 
 /// report.json of the chain (data/schema/report.schema.json): `levels` [{triangles, bytes, error_m,
-/// bound_m, rms_m, genus, holes_closed, screen_coverage, ...}].
+/// bound_m, rms_m, genus, holes_closed, closed, screen_coverage, ...}].
 std::string format_report(const LodChain& chain, const std::string& file);
 
 } // namespace taihu

@@ -71,6 +71,11 @@ void tell(const LodChain& chain, const std::string& where, const Console& consol
             "self-intersections",
             where, j, c.n_triangles, level.encoded.draco.size(), level.error_m, level.bound_m,
             c.genus, c.n_self_intersections);
+        if (!level.closed.empty())
+            console.say("{}: {} holes and ways too narrow for its bound closed: genus {} to {}, {} "
+                        "to {} pieces",
+                        where, level.closed.size(), chain.levels[0].certificate.genus, c.genus,
+                        chain.levels[0].certificate.n_components, c.n_components);
         say_unresolved(where, level.unresolved.size(), level.unresolved_error_m, console);
     }
     if (!chain.note.empty())

@@ -11,9 +11,12 @@
 #include "mesh_out/io/mesh_file.h"
 #include "mesh_out/surface_distance.h"
 #include "stats/core/error.h"
+#include "stats/core/rng.h"
 #include "tests/support/level_sets.h"
 #include "vdb_ops/balls_field.h"
+#include "vdb_ops/clean.h"
 #include "vdb_ops/csg_field.h"
+#include "vdb_ops/rasterize.h"
 
 namespace taihu {
 namespace {
@@ -240,6 +243,95 @@ TEST(Lod, SurvivesBoundsLargerThanTheRock) {
     for (const LodLevel& level : chain.levels) {
         EXPECT_TRUE(level.certificate.holds());
         EXPECT_LE(level.error_m, level.bound_m);
+    }
+}
+
+/// A ball with more small holes than matter between them.
+struct Sponge {
+    std::vector<Sphere> holes;
+    DifferenceField field;
+    openvdb::FloatGrid::Ptr grid;
+
+    Sponge()
+        : holes(made()), field(std::make_shared<BallsField>(std::vector<Sphere>{{{0, 0, 0}, 0.8}}),
+                               std::make_shared<BallsField>(holes)),
+          grid(clean(*rasterize(field, {kVoxel, {}, 3})).solid) {}
+    static std::vector<Sphere> made() {
+        const Rng rng{.seed = 3, .stream = 1};
+        std::vector<Sphere> holes;
+        for (std::uint64_t i = 0; i < 130; ++i)
+            holes.push_back({Vec3{rng.uniform(i, 0), rng.uniform(i, 1), rng.uniform(i, 2)} * 1.6 -
+                                 Vec3{1, 1, 1} * 0.8,
+                             (2 + 2.5 * rng.uniform(i, 3)) * kVoxel});
+        return holes;
+    }
+};
+
+const Sponge& sponge() {
+    static const Sponge sponge;
+    return sponge;
+}
+
+const LodChain& sponge_chain() {
+    static const LodChain chain = make_lods(*sponge().grid, &sponge().field,
+                                            {.levels = bounds_by_factor(4, 0.5 * kVoxel, 2)});
+    return chain;
+}
+
+TEST(Lod, SpongesShrinkFromLevelToLevel) {
+    ASSERT_EQ(sponge_chain().levels.size(), 4u) << sponge_chain().note;
+    std::size_t previous = 0;
+    for (const LodLevel& level : sponge_chain().levels) {
+        EXPECT_TRUE(level.certificate.holds());
+        EXPECT_EQ(level.certificate.n_self_intersections, 0u);
+        EXPECT_LE(level.error_m, level.bound_m);
+        EXPECT_GE(double(previous), 1.6 * double(previous > 0 ? level.certificate.n_triangles : 0));
+        previous = level.certificate.n_triangles;
+    }
+}
+
+TEST(Lod, HolesOfSpongesCloseAndAreNamed) {
+    const LodLevel &first = sponge_chain().levels.front(), &last = sponge_chain().levels.back();
+    EXPECT_TRUE(first.closed.empty());
+    EXPECT_FALSE(last.closed.empty());
+    EXPECT_LT(last.certificate.genus, first.certificate.genus);
+    EXPECT_EQ(last.holes_closed, first.certificate.genus - last.certificate.genus);
+    const auto report = nlohmann::json::parse(format_report(sponge_chain(), "a.glb"));
+    const auto& closed = report.at("levels")[3].at("closed");
+    EXPECT_EQ(closed.at("n"), last.closed.size());
+    EXPECT_EQ(closed.at("genus_before"), first.certificate.genus);
+    EXPECT_EQ(closed.at("components_before"), first.certificate.n_components);
+    EXPECT_EQ(closed.at("largest").size(), std::min<std::size_t>(100, last.closed.size()));
+    double before = closed.at("largest")[0].at("diameter_m");
+    for (const auto& hole : closed.at("largest")) {
+        EXPECT_LE(hole.at("diameter_m").get<double>(), before);
+        before = hole.at("diameter_m");
+        EXPECT_GT(before, 0);
+    }
+}
+
+TEST(Lod, SpongesKeepTheirBoundsButForWhatIsNamed) {
+    // Points of the sharp surface, and how far each level is from them.
+    const LabelledMesh fine = extract(*sponge().grid, &sponge().field, {.bound_vox = 0.05});
+    for (const LodLevel& level : sponge_chain().levels) {
+        const SurfaceDistance to_level(level.encoded.decoded);
+        std::size_t n_named = 0;
+        for (const Vec3& p : fine.positions) {
+            if (to_level(p) <= level.bound_m)
+                continue;
+            ++n_named;
+            const auto near = [&](const Vec3& center, double radius_m) {
+                return length(p - center) <= radius_m + level.bound_m;
+            };
+            bool is_named = false;
+            for (const Sphere& s : level.closed)
+                is_named = is_named || near(s.center, s.radius_m);
+            for (const UnresolvedPlace& u : level.unresolved)
+                is_named = is_named || near(u.center, u.radius_m);
+            ASSERT_TRUE(is_named);
+        }
+        // Most of it is outside of holes that close.
+        EXPECT_LE(n_named, fine.positions.size() / 4);
     }
 }
 
