@@ -18,6 +18,7 @@
 
 #include "mesh_out/lod.h"
 #include "stats/core/error.h"
+#include "tests/bench/ratio.h"
 #include "tests/support/bound_check.h"
 #include "tests/support/cgal_oracle.h"
 #include "tests/support/random_recipe.h"
@@ -128,8 +129,13 @@ std::string kind_of(const std::string& message) {
     return kind;
 }
 
+std::size_t milliseconds(double s) {
+    return static_cast<std::size_t>(1000 * s);
+}
+
 Counts run_recipe(std::uint64_t seed) {
     Recorder out(seed);
+    const double start_s = processor_s();
     try {
         const RandomRecipe recipe = random_recipe(seed, kVoxel);
         const std::string where = "recipe";
@@ -137,6 +143,8 @@ Counts run_recipe(std::uint64_t seed) {
         const LodChain chain =
             make_lods(*solid.solid, solid.field.get(),
                       {.levels = bounds_by_factor(kLevels, 0.25 * kVoxel, 2), .openness = false});
+        const double made_s = processor_s();
+        out.add("ms of making", milliseconds(made_s - start_s));
         const BoundCheck check(recipe.distance_m, bounds(chain.levels[0].encoded.decoded), kVoxel);
         out.add("short chains", !chain.note.empty());
         for (std::size_t j = 0; j < chain.levels.size(); ++j) {
@@ -148,6 +156,7 @@ Counts run_recipe(std::uint64_t seed) {
             out.add("levels", 1);
             out.add("triangles", mesh.triangles.size());
         }
+        out.add("ms of judging", milliseconds(processor_s() - made_s));
         out.add("chains", 1);
         out.add("chains that hold", out.counts().failed.empty());
     } catch (const Error& e) { // in place of a mesh; parts that do not meet leave none
@@ -213,14 +222,11 @@ Counts run_recipes(std::uint64_t first, std::uint64_t n, std::size_t n_jobs) {
             continue;
         }
         int status = 0;
-        rusage used{};
-        const pid_t child = wait4(-1, &status, 0, &used);
+        const pid_t child = wait(&status);
         if (running.count(child) == 0)
             throw std::runtime_error("no child process to wait for");
         counts.add(finished(running.at(child), status));
         running.erase(child);
-        counts.sums["milliseconds"] +=
-            static_cast<std::size_t>(1000 * used.ru_utime.tv_sec + used.ru_utime.tv_usec / 1000);
     }
     counts.sums["recipes"] = n;
     return counts;

@@ -24,17 +24,6 @@ bool in_any(std::span<const Sphere> balls, const Vec3& p) {
                        [&](const Sphere& b) { return length(p - b.center) <= b.radius_m; });
 }
 
-Vec3 gradient(const Lipschitz& f, const Vec3& p, double step) {
-    Vec3 g;
-    for (int a = 0; a < 3; ++a) {
-        Vec3 to = p, from = p;
-        to[a] += step;
-        from[a] -= step;
-        g[a] = f(to) - f(from);
-    }
-    return normalized(g);
-}
-
 void note(OffBound& off, const Vec3& p, double rel, bool thin) {
     ++off.n;
     off.n_thin += thin;

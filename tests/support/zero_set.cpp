@@ -8,13 +8,13 @@
 namespace taihu {
 namespace {
 
-constexpr int kDeepest = 8; ///< halvings of the cube round a ball
+constexpr int kDeepest = 7; ///< halvings of the cube round a ball
 const double kHalfDiagonal = std::sqrt(3.0);
 
 class Search {
 public:
-    Search(const Lipschitz& f, const Vec3& p, double reach_m)
-        : f_(f), p_(p), reach_m_(reach_m), inside_(f(p) < 0) {}
+    Search(const Lipschitz& f, const Vec3& p, double reach_m, int deepest)
+        : f_(f), p_(p), reach_m_(reach_m), inside_(f(p) < 0), deepest_(deepest) {}
 
     /// Whether a point of the other sign is in the part of the cube that is within reach.
     bool in_cube(const Vec3& center, double half, int depth) {
@@ -30,7 +30,7 @@ public:
             return true;
         if ((value < 0) == inside_ && std::fabs(value) > half * kHalfDiagonal)
             return false;
-        if (depth == kDeepest) {
+        if (depth == deepest_) {
             unclear_ = true;
             return false;
         }
@@ -49,6 +49,7 @@ private:
     const Vec3 p_;
     const double reach_m_;
     const bool inside_;
+    const int deepest_;
     bool unclear_ = false;
 };
 
@@ -87,10 +88,31 @@ void crossings_in(const Lipschitz& f, const Vec3& origin, double spacing_m, cons
 } // namespace
 
 Nearby surface_within(const Lipschitz& f, const Vec3& p, double reach_m) {
-    Search search(f, p, reach_m);
-    if (search.in_cube(p, reach_m, 0))
+    // Straight down the slope it mostly is there.
+    const double value = f(p);
+    const Vec3 down = gradient(f, p, 1e-3 * reach_m) * -std::copysign(1.0, value);
+    const Vec3 beyond = p + down * std::min(reach_m, 1.01 * std::fabs(value) + 1e-3 * reach_m);
+    if ((f(beyond) < 0) != (value < 0))
         return Nearby::yes;
-    return search.unclear() ? Nearby::unclear : Nearby::no;
+    for (const int deepest : {3, 5, kDeepest}) {
+        Search search(f, p, reach_m, deepest);
+        if (search.in_cube(p, reach_m, 0))
+            return Nearby::yes;
+        if (!search.unclear())
+            return Nearby::no;
+    }
+    return Nearby::unclear;
+}
+
+Vec3 gradient(const Lipschitz& f, const Vec3& p, double step_m) {
+    Vec3 g;
+    for (int a = 0; a < 3; ++a) {
+        Vec3 to = p, from = p;
+        to[a] += step_m;
+        from[a] -= step_m;
+        g[a] = f(to) - f(from);
+    }
+    return length(g) > 0 ? normalized(g) : Vec3{};
 }
 
 std::vector<Vec3> surface_crossings(const Lipschitz& f, const Box& box, double spacing_m) {

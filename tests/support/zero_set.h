@@ -23,6 +23,9 @@ Nearby surface_within(const Lipschitz& f, const Vec3& p, double reach_m);
 /// is always the same.
 std::vector<Vec3> surface_crossings(const Lipschitz& f, const Box& box, double spacing_m);
 
+/// Its direction, by differences over twice `step_m`; 0 where there is none.
+Vec3 gradient(const Lipschitz& f, const Vec3& p, double step_m);
+
 /// Where f changes its sign between two points that differ in it.
 Vec3 crossing_between(const Lipschitz& f, Vec3 a, Vec3 b);
 
