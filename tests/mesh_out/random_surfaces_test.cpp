@@ -31,6 +31,8 @@ constexpr double kVoxel = 2.0 / 64; // 64 voxels across
 constexpr int kLevels = 3;
 constexpr rlim_t kLongest_s = 100; // of processor time; most take one
 
+constexpr std::size_t kReported = 100; ///< recipes, after which all is printed that was found
+
 /// Numbers, and seeds, by what they stand for.
 struct Counts {
     std::map<std::string, std::size_t> sums;
@@ -211,6 +213,23 @@ Counts finished(const Job& job, int status) {
     return out.counts();
 }
 
+void print_seeds(const char* what,
+                 const std::map<std::string, std::vector<std::uint64_t>>& by_kind) {
+    for (const auto& [kind, seeds] : by_kind) {
+        std::printf("%s %zu: %s: seeds", what, seeds.size(), kind.c_str());
+        for (std::size_t i = 0; i < std::min<std::size_t>(seeds.size(), 20); ++i)
+            std::printf(" %llu", static_cast<unsigned long long>(seeds[i]));
+        std::printf("%s\n", seeds.size() > 20 ? " ..." : "");
+    }
+}
+
+void print(const Counts& counts) {
+    for (const auto& [what, n] : counts.sums)
+        std::printf("%12zu %s\n", n, what.c_str());
+    print_seeds("refused", counts.refused);
+    print_seeds("FAILED", counts.failed);
+}
+
 Counts run_recipes(std::uint64_t first, std::uint64_t n, std::size_t n_jobs) {
     Counts counts;
     std::map<pid_t, Job> running;
@@ -227,26 +246,10 @@ Counts run_recipes(std::uint64_t first, std::uint64_t n, std::size_t n_jobs) {
             throw std::runtime_error("no child process to wait for");
         counts.add(finished(running.at(child), status));
         running.erase(child);
+        if (++counts.sums["recipes"] % kReported == 0)
+            print(counts);
     }
-    counts.sums["recipes"] = n;
     return counts;
-}
-
-void print_seeds(const char* what,
-                 const std::map<std::string, std::vector<std::uint64_t>>& by_kind) {
-    for (const auto& [kind, seeds] : by_kind) {
-        std::printf("%s %zu: %s: seeds", what, seeds.size(), kind.c_str());
-        for (std::size_t i = 0; i < std::min<std::size_t>(seeds.size(), 20); ++i)
-            std::printf(" %llu", static_cast<unsigned long long>(seeds[i]));
-        std::printf("%s\n", seeds.size() > 20 ? " ..." : "");
-    }
-}
-
-void print(const Counts& counts) {
-    for (const auto& [what, n] : counts.sums)
-        std::printf("%12zu %s\n", n, what.c_str());
-    print_seeds("refused", counts.refused);
-    print_seeds("FAILED", counts.failed);
 }
 
 TEST(RandomSurfaces, AreClosedManifoldUncrossedAndWithinTheirBounds) {

@@ -52,8 +52,10 @@ bool BoundCheck::is_thin(const Vec3& on_surface) const {
 }
 
 bool BoundCheck::is_near_thin(const Vec3& p) const {
-    return std::any_of(points_.begin(), points_.end(),
-                       [&](const Vec3& y) { return length(y - p) < 1.5 * voxel_m_ && is_thin(y); });
+    for (std::size_t i = 0; i < points_.size(); ++i)
+        if (is_thin_[i] && length(points_[i] - p) < 1.5 * voxel_m_)
+            return true;
+    return false;
 }
 
 void BoundCheck::judge_mesh(const TriMesh& mesh, double bound_m, std::span<const Sphere> named,

@@ -1,5 +1,7 @@
 #pragma once
+#include <cstdint>
 #include <span>
+#include <vector>
 
 #include "stats/core/sphere.h"
 #include "stats/core/tri_mesh.h"
@@ -42,6 +44,7 @@ private:
     Lipschitz formula_;
     double voxel_m_;
     std::vector<Vec3> points_; ///< of the surface
+    std::vector<std::uint8_t> is_thin_;
 };
 
 } // namespace taihu

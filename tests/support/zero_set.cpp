@@ -9,6 +9,7 @@ namespace taihu {
 namespace {
 
 constexpr int kDeepest = 7; ///< halvings of the cube round a ball
+constexpr int kMostCubes = 50'000;
 const double kHalfDiagonal = std::sqrt(3.0);
 
 class Search {
@@ -25,6 +26,10 @@ public:
         }
         if (gap2 > reach_m_ * reach_m_)
             return false;
+        if (--n_left_ < 0) {
+            unclear_ = true;
+            return false;
+        }
         const double value = f_(center);
         if ((value < 0) != inside_ && length(center - p_) <= reach_m_)
             return true;
@@ -50,6 +55,7 @@ private:
     const double reach_m_;
     const bool inside_;
     const int deepest_;
+    int n_left_ = kMostCubes;
     bool unclear_ = false;
 };
 

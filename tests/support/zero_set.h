@@ -14,7 +14,7 @@ using Lipschitz = std::function<double(const Vec3&)>; ///< [m], called from seve
 enum class Nearby {
     yes,    ///< a point of the other sign was found within reach
     no,     ///< all of the ball around is on one side
-    unclear ///< at most a sliver thinner than a hundredth of the reach is not
+    unclear ///< too many parts of the ball, or slivers below a hundredth of it, may be on the other
 };
 /// Whether the surface comes within `reach_m` of `p`. Halves cubes that may hold it.
 Nearby surface_within(const Lipschitz& f, const Vec3& p, double reach_m);
