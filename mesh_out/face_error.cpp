@@ -351,7 +351,7 @@ double FaceErrors::meeting(const Meeting& pair, const Corners& face, const Range
     const double d = past_rim(pair, face, own, other);
     if (d <= pair.rules.rim_m)
         return d;
-    if (depth == kMostHalvings)
+    if (depth == kMostHalvings || !pair.rules.may_halve)
         return kInfinity;
     double most = 0;
     for (const Corners& part : quarters(face)) {
@@ -406,14 +406,6 @@ double FaceErrors::searched(const Corners& face, double enough_m, double give_up
     const double least = std::abs(n.value_m); // distances are never below it
     if (least > give_up_m)
         return least;
-    const Rules rules{.face_m = enough_m, .rim_m = enough_m, .may_pierce = true};
-    if (const std::uint32_t shape = shape_of(n.primitive); shape != kNone && least <= enough_m) {
-        const Range r = range(shape, face, nullptr, enough_m);
-        // No corner is told to lie on anything.
-        if (const double known = bound_beside(shape, r, face, {kNone, kNone, kNone}, rules);
-            known <= enough_m)
-            return known;
-    }
     const bool is_small = longest_edge(face) < kSmallest * enough_m;
     if (std::hypot(least, radius) <= enough_m || is_small) {
         double far = kInfinity;
@@ -426,6 +418,16 @@ double FaceErrors::searched(const Corners& face, double enough_m, double give_up
         }
         if (far <= enough_m || is_small)
             return far;
+    }
+    // Its parts are looked at here, so not there, too.
+    const Rules rules{
+        .face_m = enough_m, .rim_m = enough_m, .may_pierce = true, .may_halve = false};
+    if (const std::uint32_t shape = shape_of(n.primitive); shape != kNone && least <= enough_m) {
+        const Range r = range(shape, face, nullptr, enough_m);
+        // No corner is told to lie on anything.
+        if (const double known = bound_beside(shape, r, face, {kNone, kNone, kNone}, rules);
+            known <= enough_m)
+            return known;
     }
     double most = 0;
     for (const Corners& part : quarters(face)) {

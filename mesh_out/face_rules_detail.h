@@ -34,6 +34,7 @@ struct FaceRules {
     double turn_cosine = -1;   ///< of the angle to the gradient at the middle, at least
     bool exact_corners = true; ///< corners lie on all their primitives
     bool may_pierce = false;   ///< faces may pass through other primitives, within `rim_m`
+    bool may_halve = true;     ///< parts of faces may be looked at one by one
     double clear_m = 0;        ///< FaceErrors::Clearance::sampled of the first corner, or less
     /// Of the corners: then other primitives go by parabolas where these leave no doubt, which is
     /// no bound any more.
