@@ -26,7 +26,7 @@ std::vector<Vec3> lost(const Field& field) {
 
 TEST(LostSurface, NothingIsLostWhereVoxelsSeeAll) {
     EXPECT_TRUE(lost(*balls({{{0.3, 0.2, 0.1}, 20}})).empty());
-    EXPECT_TRUE(lost(*balls({{{0.3, 0.2, 0.1}, 20}, {{-9, 31, 2}, 12}})).empty());
+    EXPECT_TRUE(lost(*balls({{{0.3, 0.2, 0.1}, 20}, {{-9, 41, 2}, 12}})).empty());
 }
 
 TEST(LostSurface, FindsAWallBetweenTwoLayersOfVoxels) {
