@@ -12,6 +12,7 @@
 #include <tbb/parallel_sort.h>
 
 #include "mesh_out/crossings_detail.h"
+#include "mesh_out/piece_sides_detail.h"
 #include "stats/core/error.h"
 
 namespace taihu {
@@ -255,13 +256,21 @@ void measure_pieces(std::span<const Vec3> positions, std::span<const Triangle> f
         for (const std::uint32_t v : faces[i])
             out.box.include(positions[v]);
     }
+    std::vector<std::uint32_t> piece_of(faces.size());
     for (std::uint32_t i = 0; i < faces.size(); ++i) {
-        if (pieces.find(i) != i)
+        piece_of[i] = pieces.find(i);
+        if (piece_of[i] != i)
             continue;
         ++out.n_components;
         out.n_cavities += !open[i] && volume_x6[i] < 0;
         out.volume_m3 += volume_x6[i] / 6;
+        if (open[i])
+            volume_x6[i] = 0;
     }
+    // Where faces are missing or twisted, inside and outside mean little.
+    if (out.n_components > 1 && out.closed() && out.manifold() && out.n_misoriented_edges == 0 &&
+        out.n_nonfinite_positions == 0)
+        out.n_misplaced_pieces = count_misplaced_pieces(positions, faces, piece_of, volume_x6);
 }
 
 /// The faces that lie in space and have an area.
@@ -348,6 +357,8 @@ std::vector<std::string> faults(const Certificate& certificate) {
               "vertices where separate fans of faces meet");
     add_count(out, certificate.n_misoriented_edges, "edge between faces of opposite orientation",
               "edges between faces of opposite orientation");
+    add_count(out, certificate.n_misplaced_pieces, "piece that faces the wrong way",
+              "pieces that face the wrong way");
     // Of a mesh that is open or twisted the volume says nothing.
     if (out.empty() && !(certificate.volume_m3 > 0)) {
         char text[64];

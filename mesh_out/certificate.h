@@ -22,8 +22,10 @@ struct Certificate {
     std::size_t n_nonfinite_positions = 0;
     std::size_t n_components = 0; ///< connected over edges
     std::size_t n_cavities = 0;   ///< closed components of negative volume
-    std::int64_t euler = 0;       ///< V - E + F, without faces that repeat a vertex
-    std::int64_t genus = 0;       ///< (2 * components - euler) / 2 for a closed mesh, summed
+    /// Components inside out: of positive volume but in another, or negative and not in just one.
+    std::size_t n_misplaced_pieces = 0;
+    std::int64_t euler = 0; ///< V - E + F, without faces that repeat a vertex
+    std::int64_t genus = 0; ///< (2 * components - euler) / 2 for a closed mesh, summed
     double volume_m3 = 0, area_m2 = 0;
     Box box;
     std::size_t n_self_intersections = 0; ///< pairs of faces with an area that meet anywhere
@@ -33,7 +35,9 @@ struct Certificate {
     bool manifold() const {
         return n_nonmanifold_edges == 0 && n_nonmanifold_vertices == 0 && n_duplicate_faces == 0;
     }
-    bool outward() const { return n_misoriented_edges == 0 && volume_m3 > 0; }
+    bool outward() const {
+        return n_misoriented_edges == 0 && n_misplaced_pieces == 0 && volume_m3 > 0;
+    }
     /// Closed, 2-manifold, oriented outwards, without degenerate faces or non-finite positions.
     /// Self-intersections and the number of pieces are stated, not judged.
     bool holds() const {

@@ -17,6 +17,7 @@
 #include "mesh_out/lost_surface_detail.h"
 #include "mesh_out/openness.h"
 #include "mesh_out/part_sheets_detail.h"
+#include "mesh_out/small_pieces_detail.h"
 #include "mesh_out/surface_distance.h"
 #include "stats/core/error.h"
 #include "vdb_ops/coarser_solid.h"
@@ -38,6 +39,8 @@ constexpr double kFewBeyondGrown = 1e-3; ///< as kFewBeyond, of levels on coarse
 constexpr double kShrink = 0.68, kLeastShrink = 1. / 3; ///< of levels, as Chain::shrink_
 constexpr int kCoarsest = 8;                            ///< voxels along one of a level's own
 constexpr double kLeastMove = 1.0 / 16; ///< of what rounding may take, where faces would cross
+constexpr double kNearly = 0.75;        ///< of a bound, at one point: beyond it beside
+constexpr double kSpeck = 2, kLargestSpeck = 16; ///< bounds: pieces that long are dropped
 constexpr int kAttempts = 2, kMostLevels = 8, kMostBits = 18;
 
 std::string shown(double value) {
@@ -100,7 +103,7 @@ private:
     std::vector<Vec3> normals(const LabelledMesh& mesh) const;
     TriMesh snapped(const BoundedMesh& mesh, double bound_m, double most_m,
                     PositionGrid& grid) const;
-    void name_lost(LodLevel& level) const;
+    void name_lost(LodLevel& level, const std::vector<Vec3>& dropped) const;
     Written written(const BoundedMesh& mesh, double bound_m, double move_m) const;
     std::vector<Sphere> around(const std::vector<Vec3>& points, double radius_m) const;
     bool simplified(double bound_m, LabelledMesh& surface, LodLevel& level) const;
@@ -283,24 +286,21 @@ TriMesh Chain::snapped(const BoundedMesh& mesh, double bound_m, double most_m,
     }
 }
 
-/// Fins and slits of which the voxels show nothing, nor the mesh.
-void Chain::name_lost(LodLevel& level) const {
-    if (lost_.empty())
+/// Fins and slits of which the voxels show nothing, nor the mesh; and what it dropped.
+void Chain::name_lost(LodLevel& level, const std::vector<Vec3>& dropped) const {
+    std::vector<Vec3> lost = lost_;
+    lost.insert(lost.end(), dropped.begin(), dropped.end());
+    if (lost.empty())
         return;
     const SurfaceDistance to_mesh(level.encoded.decoded);
-    std::vector<double> off_m(lost_.size());
-    tbb::parallel_for(std::size_t{0}, lost_.size(),
-                      [&](std::size_t i) { off_m[i] = to_mesh(lost_[i]); });
     std::vector<Vec3> beyond;
-    double most_m = 0;
-    for (std::size_t i = 0; i < lost_.size(); ++i)
-        if (off_m[i] > level.bound_m) {
-            beyond.push_back(lost_[i]);
-            most_m = std::max(most_m, off_m[i]);
+    for (const Vec3& p : lost)
+        if (const double off_m = to_mesh(p); off_m > kNearly * level.bound_m) {
+            beyond.push_back(p);
+            level.unresolved_error_m = std::max(level.unresolved_error_m, off_m);
         }
     for (const Sphere& ball : around(beyond, 2 * voxel_m_))
-        level.unresolved.push_back({ball.center, ball.radius_m, most_m});
-    level.unresolved_error_m = most_m;
+        level.unresolved.push_back({ball.center, ball.radius_m, level.unresolved_error_m});
 }
 
 /// `mesh` as a file holds it: snapped, coded, decoded; certified and measured as decoded.
@@ -311,25 +311,26 @@ Chain::Written Chain::written(const BoundedMesh& mesh, double bound_m, double mo
     level.unresolved = mesh.unresolved;
     level.closed = model_.closed;
     TriMesh mesh_on_grid = snapped(mesh, bound_m, move_m, level.grid);
-    if (settings_.openness)
-        mesh_on_grid.openness = openness(mesh_on_grid, {}, progress_);
-    check_cancelled(progress_);
-    level.encoded = encode_draco(mesh_on_grid, level.grid);
-    const TriMesh& decoded = level.encoded.decoded;
-    level.certificate = certify(decoded);
-    if (!level.certificate.holds()) {
-        std::string what;
-        for (const std::string& fault : faults(level.certificate))
-            what += (what.empty() ? "" : ", ") + fault;
-        throw Error(Fault::numeric, "lod: the level of bound " + shown(bound_m) +
-                                        " m came out with " + what + "; use a smaller bound");
+    std::vector<Vec3> dropped;
+    for (double speck = kSpeck;; speck *= 2) {
+        const std::vector<Vec3> more = drop_small_pieces(mesh_on_grid, speck * bound_m);
+        dropped.insert(dropped.end(), more.begin(), more.end());
+        if (settings_.openness)
+            mesh_on_grid.openness = openness(mesh_on_grid, {}, progress_);
+        check_cancelled(progress_);
+        level.encoded = encode_draco(mesh_on_grid, level.grid);
+        level.certificate = certify(level.encoded.decoded);
+        if (level.certificate.n_misplaced_pieces == 0 || speck >= kLargestSpeck)
+            break;
     }
+    const TriMesh& decoded = level.encoded.decoded;
+    require_certificate(level.certificate, "lod: the level of bound " + shown(bound_m) + " m");
     if (level.certificate.n_self_intersections > 0)
         for (const auto& [f, g] : crossing_pairs(decoded.positions, decoded.triangles))
             for (const std::uint32_t v : decoded.triangles[f])
                 out.crossings.push_back(decoded.positions[v]);
     check_cancelled(progress_);
-    name_lost(level);
+    name_lost(level, dropped);
     std::vector<Sphere> apart;
     for (const UnresolvedPlace& place : level.unresolved)
         apart.push_back({place.center, place.radius_m + bound_m});

@@ -291,6 +291,27 @@ TEST(Certificate, CountsCavitiesAndTakesTheirVolumeAway) {
     EXPECT_EQ(c.n_self_intersections, 0u);
 }
 
+TEST(Certificate, JudgesTheSideOfEveryPiece) {
+    const TriMesh small = tetrahedron({0.1, 0.1, 0.1}, 0.5), apart = tetrahedron({3, 0, 0});
+    EXPECT_TRUE(certify(joined(tetrahedron(), apart)).holds());
+    const Certificate flipped =
+        certify(joined(tetrahedron(), turned_inside_out(tetrahedron({3, 0, 0}, 0.5))));
+    EXPECT_EQ(flipped.n_misplaced_pieces, 1u);
+    EXPECT_GT(flipped.volume_m3, 0);
+    EXPECT_FALSE(flipped.outward());
+    EXPECT_THAT(faults(flipped), ElementsAre("1 piece that faces the wrong way"));
+    EXPECT_EQ(certify(joined(tetrahedron(), small)).n_misplaced_pieces, 1u);
+    // A solid in the cavity of another, beside a third.
+    const TriMesh core = tetrahedron({0.15, 0.15, 0.15}, 0.25);
+    EXPECT_TRUE(
+        certify(joined(joined(joined(tetrahedron(), turned_inside_out(small)), core), apart))
+            .holds());
+    EXPECT_EQ(
+        certify(joined(joined(tetrahedron(), turned_inside_out(small)), turned_inside_out(core)))
+            .n_misplaced_pieces,
+        1u);
+}
+
 TEST(Certificate, KeepsTheVolumeOfAPieceFarFromTheFirst) {
     const Certificate c = certify(joined(tetrahedron(), tetrahedron({1e6, 1e6, 1e6})));
     // Coordinates of 1e6 are multiples of 1.2e-10, and 1e6 + 1 is exact: only products round.

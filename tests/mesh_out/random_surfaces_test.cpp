@@ -102,6 +102,8 @@ void judge_bound(const LodLevel& level, const TriMesh& mesh, const BoundCheck& c
     std::vector<Sphere> named;
     for (const UnresolvedPlace& place : level.unresolved)
         named.push_back({place.center, place.radius_m + level.bound_m});
+    for (const Sphere& closed : level.closed)
+        named.push_back({closed.center, closed.radius_m + level.bound_m});
     const BoundVerdict verdict = check.judge(mesh, level.bound_m, named);
     out.add("samples", verdict.n_samples);
     out.add("samples named", verdict.n_named);
