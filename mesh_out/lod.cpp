@@ -4,7 +4,6 @@
 #include <array>
 #include <cmath>
 #include <cstdint>
-#include <cstdio>
 #include <memory>
 #include <optional>
 #include <utility>
@@ -20,6 +19,7 @@
 #include "mesh_out/small_pieces_detail.h"
 #include "mesh_out/surface_distance.h"
 #include "stats/core/error.h"
+#include "stats/number_detail.h"
 #include "vdb_ops/coarser_solid.h"
 #include "vdb_ops/placed_level_set_field.h"
 #include "vdb_ops/rasterize.h"
@@ -44,9 +44,7 @@ constexpr double kSpeck = 2, kLargestSpeck = 16; ///< bounds: pieces that long a
 constexpr int kAttempts = 2, kMostLevels = 8, kMostBits = 18;
 
 std::string shown(double value) {
-    char text[32];
-    std::snprintf(text, sizeof text, "%.6g", value);
-    return text;
+    return rounded(value, 6);
 }
 
 void require(const LodSettings& settings) {
