@@ -1,0 +1,379 @@
+#include "mesh_out/bake.h"
+
+#include <algorithm>
+#include <array>
+#include <atomic>
+#include <cmath>
+#include <numbers>
+#include <string>
+#include <vector>
+
+#include <tbb/parallel_for.h>
+
+#include "mesh_out/closest_point_detail.h"
+#include "mesh_out/io/exr_file.h"
+#include "mesh_out/io/image_file.h"
+#include "mesh_out/openness.h"
+#include "stats/core/error.h"
+#include "stats/core/rng.h"
+
+namespace taihu {
+namespace {
+
+constexpr double kOn_vox = 1e-3;      ///< near enough to the surface [voxels]
+constexpr double kGrazing_vox = 0.05; ///< where a ray that hardly gets on is taken to have met it
+constexpr int kMostSteps = 64, kBisections = 24;
+constexpr int kMostSide_px = 8192, kMostGutter_px = 16;
+constexpr std::size_t kMostSamples = 200000; ///< of relit_error()
+constexpr std::uint32_t kPartColours = 77;   ///< stream of random numbers
+
+[[noreturn]] void refuse(const std::string& what) {
+    throw Error(Fault::bad_argument, "bake: " + what);
+}
+
+TriMesh with_openness(TriMesh surface, int n_rays, Progress* progress) {
+    if (surface.openness.empty()) {
+        report_stage(progress, "openness of the fine surface");
+        surface.openness = openness(surface, {.n_rays = n_rays}, progress);
+    }
+    return surface;
+}
+
+double positive(const char* name, double length_m) {
+    if (!(length_m > 0) || !std::isfinite(length_m))
+        refuse(std::string(name) + " is " + std::to_string(length_m) + ", must be finite and > 0");
+    return length_m;
+}
+
+using Weights = std::array<double, 3>;
+
+/// What a viewer interpolates over a face.
+struct Frame {
+    Vec3 point, tangent, bitangent, normal;
+
+    /// The direction whose multiples along tangent, bitangent and normal are these.
+    Vec3 world(const Vec3& v) const {
+        return normalized(tangent * v.x + bitangent * v.y + normal * v.z);
+    }
+    /// The other way: by Cramer, since an interpolated frame is not quite square.
+    Vec3 local(const Vec3& v) const {
+        const Vec3 bn = cross(bitangent, normal);
+        const double det = dot(tangent, bn);
+        if (!(std::fabs(det) > 1e-3)) // nothing to go by
+            return {0, 0, 1};
+        return normalized(
+            Vec3{dot(v, bn), dot(v, cross(normal, tangent)), dot(v, cross(tangent, bitangent))} /
+            det);
+    }
+};
+
+Frame frame_at(const TexturedMesh& coarse, std::uint32_t face, const Weights& w) {
+    Frame out;
+    for (std::size_t k = 0; k < 3; ++k) {
+        const std::uint32_t i = coarse.mesh.triangles[face][k];
+        const Vec3 n = normalized(coarse.mesh.normals[i]), t = normalized(coarse.tangents[i]);
+        out.point += coarse.mesh.positions[i] * w[k];
+        out.normal += n * w[k];
+        out.tangent += t * w[k];
+        out.bitangent += normalized(cross(n, t)) * w[k];
+    }
+    out.normal = normalized(out.normal);
+    out.tangent = normalized(out.tangent);
+    out.bitangent = normalized(out.bitangent);
+    return out;
+}
+
+/// Weights within the face, where those of a place outside of it are not.
+Weights held(Weights w) {
+    double sum = 0;
+    for (double& x : w)
+        sum += x = std::max(x, 0.0);
+    for (double& x : w)
+        x /= sum;
+    return w;
+}
+
+/// Grows faces over texels beside them, a ring at a time.
+void grow(std::vector<std::uint32_t>& owners, int side_px, int n_rings) {
+    constexpr std::array<std::array<int, 2>, 8> kBeside = {
+        {{-1, 0}, {1, 0}, {0, -1}, {0, 1}, {-1, -1}, {1, -1}, {-1, 1}, {1, 1}}};
+    const auto index = [&](int x, int y) {
+        return static_cast<std::size_t>(y) * static_cast<std::size_t>(side_px) +
+               static_cast<std::size_t>(x);
+    };
+    for (int ring = 0; ring < n_rings; ++ring) {
+        const std::vector<std::uint32_t> before = owners;
+        tbb::parallel_for(0, side_px, [&](int y) {
+            for (int x = 0; x < side_px; ++x)
+                for (std::size_t k = 0; k < 8 && owners[index(x, y)] == kNoFace; ++k) {
+                    const int i = x + kBeside[k][0], j = y + kBeside[k][1];
+                    if (i >= 0 && j >= 0 && i < side_px && j < side_px)
+                        owners[index(x, y)] = before[index(i, j)];
+                }
+        });
+    }
+}
+
+void set(Image& image, int x, int y, const Vec3& v) {
+    for (int c = 0; c < 3; ++c)
+        image.at(x, y)[c] = static_cast<float>(v[c]);
+}
+
+/// An 8-bit sample as a reader has it, 0..1.
+double stored(double value) {
+    return std::floor(255 * std::clamp(value, 0.0, 1.0) + 0.5) / 255;
+}
+
+Image halved(const Image& normals) {
+    Image out = normals;
+    for (float& v : out.pixels)
+        v = (v + 1) / 2;
+    return out;
+}
+
+/// The normal that a viewer reads from the 8-bit map between four texels.
+Vec3 read_normal(const Image& map, int x, int y) {
+    Vec3 sum;
+    for (const auto& [i, j] : {std::array{x - 1, y - 1}, {x, y - 1}, {x - 1, y}, {x, y}})
+        for (int c = 0; c < 3; ++c)
+            sum[c] += (2 * stored((double{map.at(i, j)[c]} + 1) / 2) - 1) / 4;
+    return sum;
+}
+
+double angle_deg(const Vec3& a, const Vec3& b) {
+    return std::atan2(length(cross(a, b)), dot(a, b)) * 180 / std::numbers::pi;
+}
+
+} // namespace
+
+BakeSource::BakeSource(const Field& field, TriMesh surface, double voxel_m, double reach_m,
+                       int n_rays, Progress* progress)
+    : surface_(with_openness(std::move(surface), n_rays, progress)), nearest_(surface_),
+      voxel_m_(positive("voxel_m", voxel_m)), reach_m_(positive("reach_m", reach_m)) {
+    // A coarse mesh lies in the cage, and the step of curvatures reaches a little beyond.
+    probe_ = field.probe(bounds(surface_).dilated(2 * (reach_m + voxel_m)), reach_m + voxel_m);
+}
+
+BakeSource::Place BakeSource::meet(const Vec3& p, const Vec3& normal, double reach_m) const {
+    const double on_m = kOn_vox * voxel_m_;
+    double value = probe_->at(p).value_m, t = 0;
+    const double way = value > 0 ? -1 : 1;
+    const auto at = [&](double along) { return p + normal * (way * along); };
+    bool is_met = std::fabs(value) <= on_m;
+    for (int i = 0; i < kMostSteps && !is_met && t <= reach_m; ++i) {
+        const double step = std::max(std::fabs(value), on_m);
+        const double next = probe_->at(at(t + step)).value_m;
+        if (next * value < 0) { // past it: fields of voxels are no exact distances
+            double lo = t, hi = t + step;
+            for (int k = 0; k < kBisections; ++k) {
+                const double middle = (lo + hi) / 2;
+                (probe_->at(at(middle)).value_m * value > 0 ? lo : hi) = middle;
+            }
+            t = hi;
+            is_met = true;
+        } else {
+            t += step;
+            value = next;
+            is_met = std::fabs(value) <= on_m;
+        }
+    }
+    is_met = (is_met || std::fabs(value) <= kGrazing_vox * voxel_m_) && t <= reach_m;
+    Place out;
+    out.is_traced = is_met;
+    out.point = is_met ? at(t) : nearest_.nearest(p);
+    out.offset_m = dot(out.point - p, normal);
+    out.primitive = probe_->at(out.point).primitive;
+    out.normal = normalized(probe_->of(out.primitive, out.point).gradient);
+    if (out.normal == Vec3{})
+        out.normal = normal;
+    return out;
+}
+
+double BakeSource::openness_at(const Vec3& p) const {
+    const Triangle& t = surface_.triangles[nearest_.nearest_triangle(p)];
+    const Vec3 &a = surface_.positions[t[0]], &b = surface_.positions[t[1]],
+               &c = surface_.positions[t[2]];
+    const Vec3 q = closest_point_on_triangle(p, a, b, c);
+    const double wa = length(cross(b - q, c - q)), wb = length(cross(c - q, a - q)),
+                 wc = length(cross(a - q, b - q)), sum = wa + wb + wc;
+    const std::vector<float>& o = surface_.openness;
+    return sum > 0 ? (wa * double{o[t[0]]} + wb * double{o[t[1]]} + wc * double{o[t[2]]}) / sum
+                   : double{o[t[0]]};
+}
+
+double BakeSource::curvature_at(const Vec3& p) const {
+    const auto value = [&](const Vec3& q) { return probe_->at(q).value_m; };
+    double sum = -6 * value(p);
+    for (int axis = 0; axis < 3; ++axis) {
+        Vec3 step;
+        step[axis] = voxel_m_;
+        sum += value(p + step) + value(p - step);
+    }
+    return std::clamp(sum / (2 * voxel_m_ * voxel_m_), -1 / voxel_m_, 1 / voxel_m_);
+}
+
+BakedMaps bake(const TexturedMesh& coarse, const BakeSource& fine, const BakeSettings& settings,
+               Progress* progress) {
+    const int side = settings.side_px;
+    if (side > kMostSide_px)
+        refuse("side_px is " + std::to_string(side) + ", must be 1..8192");
+    if (!(settings.reach_m > 0 && settings.reach_m <= fine.reach_m()))
+        refuse("reach_m is " + std::to_string(settings.reach_m) +
+               ", must be > 0 and at most that of the fine surface, " +
+               std::to_string(fine.reach_m()));
+    if (settings.gutter_px < 0 || settings.gutter_px > kMostGutter_px)
+        refuse("gutter_px is " + std::to_string(settings.gutter_px) + ", must be 0..16");
+    if (coarse.mesh.normals.size() != coarse.mesh.positions.size() ||
+        coarse.tangents.size() != coarse.mesh.positions.size())
+        refuse("the mesh needs a normal and a tangent for each position");
+    const std::vector<std::uint32_t> on_face = texel_faces(coarse, side);
+    std::vector<std::uint32_t> owners = on_face;
+    grow(owners, side, settings.gutter_px);
+
+    const int masters_px = settings.masters ? side : 0;
+    BakedMaps out{.normal = {side, side, 3},
+                  .object_normal = {masters_px, masters_px, 3},
+                  .displacement = {masters_px, masters_px, 1},
+                  .occlusion = {side, side, 1},
+                  .curvature = {masters_px, masters_px, 1},
+                  .part = {masters_px, masters_px, 1}};
+    struct Row {
+        std::size_t n = 0, n_nearest = 0;
+        double squares = 0, most = 0;
+    };
+    std::vector<Row> rows(static_cast<std::size_t>(side));
+    std::atomic<int> n_done = 0;
+    tbb::parallel_for(0, side, [&](int y) {
+        check_cancelled(progress);
+        Row& row = rows[static_cast<std::size_t>(y)];
+        for (int x = 0; x < side; ++x) {
+            const std::size_t texel = static_cast<std::size_t>(y) * static_cast<std::size_t>(side) +
+                                      static_cast<std::size_t>(x);
+            const std::uint32_t face = owners[texel];
+            if (face == kNoFace) {
+                set(out.normal, x, y, {0, 0, 1});
+                *out.occlusion.at(x, y) = 1;
+                if (settings.masters)
+                    set(out.object_normal, x, y, {0, 0, 1});
+                continue;
+            }
+            const Frame frame =
+                frame_at(coarse, face, held(texture_weights(coarse, face, x + 0.5, y + 0.5, side)));
+            const BakeSource::Place place = fine.meet(frame.point, frame.normal, settings.reach_m);
+            set(out.normal, x, y, frame.local(place.normal));
+            *out.occlusion.at(x, y) = static_cast<float>(fine.openness_at(place.point));
+            if (settings.masters) {
+                set(out.object_normal, x, y, place.normal);
+                *out.displacement.at(x, y) = static_cast<float>(place.offset_m);
+                *out.curvature.at(x, y) = static_cast<float>(fine.curvature_at(place.point));
+                *out.part.at(x, y) = static_cast<float>(place.primitive);
+            }
+            if (on_face[texel] != kNoFace) {
+                ++row.n;
+                row.n_nearest += !place.is_traced;
+                row.squares += place.offset_m * place.offset_m;
+                row.most = std::max(row.most, std::fabs(place.offset_m));
+            }
+        }
+        if (const int done = ++n_done; done % (side / 100 + 1) == 0)
+            report_fraction(progress, double(done) / side);
+    });
+    double squares = 0;
+    for (const Row& row : rows) {
+        out.n_texels += row.n;
+        out.n_nearest += row.n_nearest;
+        squares += row.squares;
+        out.most_displacement_m = std::max(out.most_displacement_m, row.most);
+    }
+    out.rms_displacement_m = out.n_texels > 0 ? std::sqrt(squares / double(out.n_texels)) : 0;
+    return out;
+}
+
+std::string normal_png(const BakedMaps& maps) {
+    return format_png(halved(maps.normal), PngValues::data, "normal map");
+}
+
+std::string occlusion_png(const BakedMaps& maps) {
+    return format_png(maps.occlusion, PngValues::data, "occlusion map");
+}
+
+RelitError relit_error(const TexturedMesh& coarse, const BakeSource& fine, const BakedMaps& maps,
+                       double reach_m, Progress* progress) {
+    const int side = maps.normal.width;
+    const std::vector<std::uint32_t> faces = texel_faces(coarse, side);
+    const int step = 1 + static_cast<int>(std::sqrt(double(maps.n_texels) / double(kMostSamples)));
+    struct Row {
+        double sum = 0, plain = 0;
+        std::size_t n = 0;
+    };
+    std::vector<Row> rows(static_cast<std::size_t>(side));
+    tbb::parallel_for(1, side, [&](int y) {
+        if (y % step != 0)
+            return;
+        check_cancelled(progress);
+        Row& row = rows[static_cast<std::size_t>(y)];
+        for (int x = 1; x < side; ++x) {
+            const std::uint32_t face =
+                faces[static_cast<std::size_t>(y) * static_cast<std::size_t>(side) +
+                      static_cast<std::size_t>(x)];
+            if (x % step != 0 || face == kNoFace)
+                continue;
+            const Weights w = texture_weights(coarse, face, x, y, side); // the texel's corner
+            if (*std::min_element(w.begin(), w.end()) < 0)
+                continue;
+            const Frame frame = frame_at(coarse, face, w);
+            const Vec3 truth = fine.meet(frame.point, frame.normal, reach_m).normal;
+            row.sum += angle_deg(frame.world(read_normal(maps.normal, x, y)), truth);
+            row.plain += angle_deg(frame.normal, truth);
+            ++row.n;
+        }
+    });
+    RelitError out;
+    for (const Row& row : rows) {
+        out.mean_deg += row.sum;
+        out.plain_mean_deg += row.plain;
+        out.n_samples += row.n;
+    }
+    if (out.n_samples > 0) {
+        out.mean_deg /= double(out.n_samples);
+        out.plain_mean_deg /= double(out.n_samples);
+    }
+    return out;
+}
+
+void write_maps(const std::filesystem::path& folder, const std::string& stem,
+                const BakedMaps& maps) {
+    if (maps.part.pixels.empty())
+        refuse("the maps were baked without masters; bake them again with");
+    const auto write = [&](const char* name, const Image& image, ExrSamples samples,
+                           std::vector<std::pair<std::string, std::string>> attributes) {
+        std::vector<std::string> channels = {"Y"};
+        if (image.channels > 1)
+            channels.assign({"R", "G", "B"});
+        if (image.channels > 3)
+            channels.emplace_back("part");
+        write_exr(folder / (stem + '_' + name + ".exr"), {image, channels, std::move(attributes)},
+                  samples);
+    };
+    Image parts(maps.part.width, maps.part.height, 4);
+    for (std::size_t i = 0; i < maps.part.pixels.size(); ++i) {
+        const auto part = static_cast<std::uint64_t>(maps.part.pixels[i]);
+        for (std::uint32_t c = 0; c < 3; ++c)
+            parts.pixels[4 * i + c] = static_cast<float>(Rng{0, kPartColours}.uniform(part, c));
+        parts.pixels[4 * i + 3] = maps.part.pixels[i];
+    }
+    write("normal", maps.normal, ExrSamples::half,
+          {{"quantity", "normal"}, {"frame", "tangent, bitangent, normal"}, {"unit", "1"}});
+    write("object_normal", maps.object_normal, ExrSamples::half,
+          {{"quantity", "normal"}, {"frame", "x, y, z of the mesh, +Y up"}, {"unit", "1"}});
+    write("occlusion", maps.occlusion, ExrSamples::half,
+          {{"quantity", "share of the sky that is seen"}, {"unit", "1"}});
+    write("displacement", maps.displacement, ExrSamples::full,
+          {{"quantity", "displacement along the normal"}, {"unit", "m"}, {"scale", "1"}});
+    write("curvature", maps.curvature, ExrSamples::full,
+          {{"quantity", "mean curvature, positive where convex"}, {"unit", "1/m"}});
+    write("part", parts, ExrSamples::full,
+          {{"quantity", "number of the surface that the texel is of, and a colour for it"}});
+}
+
+} // namespace taihu
