@@ -22,6 +22,7 @@ namespace {
 
 constexpr double kOn_vox = 1e-3;      ///< near enough to the surface [voxels]
 constexpr double kGrazing_vox = 0.05; ///< where a ray that hardly gets on is taken to have met it
+constexpr double kInside = 0.01;      ///< least weight of a corner where a gutter texel is baked
 constexpr int kMostSteps = 64, kBisections = 24;
 constexpr int kMostSide_px = 8192, kMostGutter_px = 16;
 constexpr std::size_t kMostSamples = 200000; ///< of relit_error()
@@ -83,11 +84,14 @@ Frame frame_at(const TexturedMesh& coarse, std::uint32_t face, const Weights& w)
     return out;
 }
 
-/// Weights within the face, where those of a place outside of it are not.
+/// Of a place outside of the face, weights a little inside of it: on an edge itself the fine
+/// surface may turn sharply, and which side of it is met would be chance.
 Weights held(Weights w) {
+    if (*std::min_element(w.begin(), w.end()) >= 0)
+        return w;
     double sum = 0;
     for (double& x : w)
-        sum += x = std::max(x, 0.0);
+        sum += x = std::max(x, kInside);
     for (double& x : w)
         x /= sum;
     return w;
@@ -146,12 +150,13 @@ double angle_deg(const Vec3& a, const Vec3& b) {
 
 } // namespace
 
-BakeSource::BakeSource(const Field& field, TriMesh surface, double voxel_m, double reach_m,
-                       int n_rays, Progress* progress)
-    : surface_(with_openness(std::move(surface), n_rays, progress)), nearest_(surface_),
-      voxel_m_(positive("voxel_m", voxel_m)), reach_m_(positive("reach_m", reach_m)) {
+BakeSource::BakeSource(const Field& field, TriMesh surface, const BakeSourceSettings& settings,
+                       Progress* progress)
+    : surface_(with_openness(std::move(surface), settings.n_rays, progress)), nearest_(surface_),
+      voxel_m_(positive("voxel_m", settings.voxel_m)),
+      reach_m_(positive("reach_m", settings.reach_m)), normals_(settings.normals) {
     // A coarse mesh lies in the cage, and the step of curvatures reaches a little beyond.
-    probe_ = field.probe(bounds(surface_).dilated(2 * (reach_m + voxel_m)), reach_m + voxel_m);
+    probe_ = field.probe(bounds(surface_).dilated(2 * (reach_m_ + voxel_m_)), reach_m_ + voxel_m_);
 }
 
 BakeSource::Place BakeSource::meet(const Vec3& p, const Vec3& normal, double reach_m) const {
@@ -183,22 +188,38 @@ BakeSource::Place BakeSource::meet(const Vec3& p, const Vec3& normal, double rea
     out.point = is_met ? at(t) : nearest_.nearest(p);
     out.offset_m = dot(out.point - p, normal);
     out.primitive = probe_->at(out.point).primitive;
-    out.normal = normalized(probe_->of(out.primitive, out.point).gradient);
+    if (normals_ == NormalsOf::field) {
+        out.normal = normalized(probe_->of(out.primitive, out.point).gradient);
+    } else {
+        const auto [corners, w] = nearest_weights(out.point);
+        out.normal =
+            normalized(surface_.normals[corners[0]] * w[0] + surface_.normals[corners[1]] * w[1] +
+                       surface_.normals[corners[2]] * w[2]);
+    }
     if (out.normal == Vec3{})
         out.normal = normal;
     return out;
 }
 
-double BakeSource::openness_at(const Vec3& p) const {
+std::pair<Triangle, std::array<double, 3>> BakeSource::nearest_weights(const Vec3& p) const {
     const Triangle& t = surface_.triangles[nearest_.nearest_triangle(p)];
     const Vec3 &a = surface_.positions[t[0]], &b = surface_.positions[t[1]],
                &c = surface_.positions[t[2]];
     const Vec3 q = closest_point_on_triangle(p, a, b, c);
-    const double wa = length(cross(b - q, c - q)), wb = length(cross(c - q, a - q)),
-                 wc = length(cross(a - q, b - q)), sum = wa + wb + wc;
-    const std::vector<float>& o = surface_.openness;
-    return sum > 0 ? (wa * double{o[t[0]]} + wb * double{o[t[1]]} + wc * double{o[t[2]]}) / sum
-                   : double{o[t[0]]};
+    Weights w = {length(cross(b - q, c - q)), length(cross(c - q, a - q)),
+                 length(cross(a - q, b - q))};
+    const double sum = w[0] + w[1] + w[2];
+    for (double& x : w)
+        x = sum > 0 ? x / sum : 1.0 / 3;
+    return {t, w};
+}
+
+double BakeSource::openness_at(const Vec3& p) const {
+    const auto [corners, w] = nearest_weights(p);
+    double out = 0;
+    for (std::size_t k = 0; k < 3; ++k)
+        out += w[k] * double{surface_.openness[corners[k]]};
+    return out;
 }
 
 double BakeSource::curvature_at(const Vec3& p) const {

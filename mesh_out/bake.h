@@ -1,8 +1,10 @@
 #pragma once
+#include <array>
 #include <cstddef>
 #include <filesystem>
 #include <memory>
 #include <string>
+#include <utility>
 
 #include "mesh_out/surface_distance.h"
 #include "mesh_out/textured_mesh.h"
@@ -11,6 +13,18 @@
 #include "vdb_ops/field.h"
 
 namespace taihu {
+
+enum class NormalsOf {
+    field,  ///< gradients
+    surface ///< the mesh's own, interpolated: a field made of faces has theirs alone
+};
+
+struct BakeSourceSettings {
+    double voxel_m = 0; ///< size of the finest detail, > 0: the step of curvatures
+    double reach_m = 0; ///< the most that any coarse mesh is off the fine surface, > 0
+    int n_rays = 64;    ///< of openness(), 1..4096
+    NormalsOf normals = NormalsOf::field;
+};
 
 /// The fine surface that maps are baked from: a field, and a mesh of it that knows how much of the
 /// sky each place sees. One for all levels. Thread-safe to ask.
@@ -25,11 +39,9 @@ public:
     };
 
     /// \param field  outlives this. \param surface  a fine mesh of it, with normals; openness is
-    /// worked out where it has none. \param voxel_m  the size of the finest detail, > 0: the step
-    /// of curvatures. \param reach_m  the most that any coarse mesh is off the fine surface, > 0.
-    /// \param n_rays  of openness(), 1..4096. \throws Error bad_argument: a length out of range, or
-    /// as openness(); cancelled.
-    BakeSource(const Field& field, TriMesh surface, double voxel_m, double reach_m, int n_rays = 64,
+    /// worked out where it has none.
+    /// \throws Error bad_argument: a length out of range, or as openness(); cancelled.
+    BakeSource(const Field& field, TriMesh surface, const BakeSourceSettings& settings,
                Progress* progress = nullptr);
 
     /// Along the normal, outwards from inside of the solid and inwards from outside, by steps as
@@ -43,10 +55,14 @@ public:
     double reach_m() const { return reach_m_; }
 
 private:
+    /// The nearest triangle of the surface, and the weights of its corners.
+    std::pair<Triangle, std::array<double, 3>> nearest_weights(const Vec3& p) const;
+
     std::unique_ptr<const FieldProbe> probe_;
     TriMesh surface_;
     SurfaceDistance nearest_;
     double voxel_m_, reach_m_;
+    NormalsOf normals_;
 };
 
 struct BakeSettings {

@@ -8,13 +8,38 @@
 #include "vdb_ops/rasterize.h"
 
 namespace taihu {
+namespace {
+
+constexpr int kLeastSide_px = 64;
+
+/// An atlas no larger than its texels need be.
+ChartAtlas coarse_enough(const TriMesh& mesh, const BakeLevelSettings& settings,
+                         Progress* progress) {
+    AtlasSettings s{.side_px = settings.side_px, .gutter_px = settings.gutter_px};
+    ChartAtlas atlas = chart_atlas(mesh, s, progress);
+    while (atlas.texel_m < settings.texel_m && s.side_px >= 2 * kLeastSide_px) {
+        s.side_px /= 2;
+        try {
+            ChartAtlas half = chart_atlas(mesh, s, progress);
+            if (half.texel_m > settings.texel_m)
+                break;
+            atlas = std::move(half);
+        } catch (const Error& e) { // no room for so many charts
+            if (e.fault() != Fault::numeric)
+                throw;
+            break;
+        }
+    }
+    return atlas;
+}
+
+} // namespace
 
 BakedLevel bake_level(const LodLevel& level, const BakeSource& fine,
                       const BakeLevelSettings& settings, Progress* progress) {
     TriMesh mesh = level.encoded.decoded;
     mesh.openness.clear();
-    const ChartAtlas atlas =
-        chart_atlas(mesh, {.side_px = settings.side_px, .gutter_px = settings.gutter_px}, progress);
+    const ChartAtlas atlas = coarse_enough(mesh, settings, progress);
     BakedLevel out;
     out.n_charts = atlas.charts.size();
     out.texel_m = atlas.texel_m;
@@ -28,7 +53,7 @@ BakedLevel bake_level(const LodLevel& level, const BakeSource& fine,
     report_stage(progress, "baking");
     out.maps = bake(decoded, fine,
                     {.reach_m = settings.reach_m,
-                     .side_px = settings.side_px,
+                     .side_px = atlas.side_px,
                      .gutter_px = settings.gutter_px,
                      .masters = settings.masters},
                     progress);
@@ -52,7 +77,10 @@ BakeSource bake_source(const openvdb::FloatGrid& solid, const Field& field, doub
     surface.normals = surface_normals(fine, *probe);
     if (n_rays == 0)
         surface.openness.assign(surface.positions.size(), 1);
-    return {field, std::move(surface), voxel_m, reach_m, n_rays == 0 ? 1 : n_rays, progress};
+    return {field,
+            std::move(surface),
+            {.voxel_m = voxel_m, .reach_m = reach_m, .n_rays = n_rays == 0 ? 1 : n_rays},
+            progress};
 }
 
 } // namespace taihu

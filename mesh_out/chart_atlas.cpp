@@ -135,6 +135,7 @@ void Builder::pack() {
                                         std::to_string(settings_.side_px) + " x " +
                                         std::to_string(settings_.side_px) +
                                         " texels; use a larger one, or a mesh of fewer triangles");
+    atlas_.side_px = settings_.side_px;
     atlas_.texel_m = shelves->texel_m;
     for (std::size_t c = 0; c < sizes.size(); ++c) {
         const auto& [x, y, width, height] = shelves->places[c];

@@ -30,6 +30,7 @@ struct ChartAtlas {
     TexturedMesh textured;
     std::vector<Chart> charts;
     std::vector<std::uint32_t> chart_of; ///< of each triangle
+    int side_px = 0;                     ///< of the texture
     double texel_m = 0;                  ///< on the plane of projection, the same everywhere
     double most_stretch = 0;             ///< of a face: its area over that of its image
     double stretched_area_rel = 0;       ///< share of the area of faces beyond sqrt(3)

@@ -5,16 +5,14 @@
 #include <limits>
 #include <numbers>
 #include <numeric>
-#include <queue>
 #include <tuple>
-#include <utility>
 
 namespace taihu {
 namespace {
 
 using Neighbours = std::span<const std::array<std::uint32_t, 3>>;
 
-constexpr int kMostPasses = 8;
+constexpr int kSmoothings = 2, kMostPasses = 8;
 constexpr std::uint32_t kNone = kNoFace;
 
 int dominant_direction(const Vec3& n) {
@@ -73,77 +71,22 @@ std::optional<std::uint8_t> joined_direction(std::span<const std::uint32_t> patc
     return static_cast<std::uint8_t>(best - border.begin());
 }
 
-/// Connected faces that all look in one direction enough.
-struct Candidate {
-    double area_m2 = 0;
-    int direction = 0;
-    std::vector<std::uint32_t> faces; ///< the first has the least number
-
-    bool operator<(const Candidate& other) const { // the last is the one to take
-        if (area_m2 != other.area_m2)
-            return area_m2 < other.area_m2;
-        return std::pair(direction, faces.front()) >
-               std::pair(other.direction, other.faces.front());
-    }
-};
-
-/// Gives faces to the largest patch that can be had, then to the largest of what is left, until
-/// all have their direction.
-class LargestFirst {
-public:
-    LargestFirst(std::span<const double> areas, Neighbours neighbours)
-        : areas_(areas), neighbours_(neighbours), mark_(areas.size()),
-          directions_(areas.size(), kFree) {}
-
-    void add(int direction, std::vector<std::uint32_t> faces) {
-        const std::uint32_t inside = ++n_marks_;
-        for (const std::uint32_t f : faces)
-            mark_[f] = inside;
-        for (const std::uint32_t first : faces) {
-            if (mark_[first] != inside)
-                continue;
-            Candidate part{0, direction, {first}};
-            mark_[first] = 0;
-            for (std::size_t i = 0; i < part.faces.size(); ++i) {
-                part.area_m2 += areas_[part.faces[i]];
-                for (const std::uint32_t g : neighbours_[part.faces[i]])
-                    if (g != kNone && mark_[g] == inside) {
-                        mark_[g] = 0;
-                        part.faces.push_back(g);
-                    }
-            }
-            queue_.push(std::move(part));
+/// Normals of faces, mixed with those of their neighbours.
+std::vector<Vec3> smoothed(std::span<const Vec3> normals, std::span<const double> areas,
+                           Neighbours neighbours) {
+    std::vector<Vec3> now(normals.begin(), normals.end());
+    for (int i = 0; i < kSmoothings; ++i) {
+        const std::vector<Vec3> before = now;
+        for (std::size_t f = 0; f < now.size(); ++f) {
+            Vec3 sum = before[f] * areas[f];
+            for (const std::uint32_t g : neighbours[f])
+                if (g != kNone)
+                    sum += before[g] * areas[g];
+            now[f] = normalized(sum);
         }
     }
-
-    std::vector<std::uint8_t> directions() {
-        while (!queue_.empty()) {
-            Candidate best = queue_.top();
-            queue_.pop();
-            const std::size_t n = best.faces.size();
-            std::erase_if(best.faces,
-                          [&](std::uint32_t f) { return directions_[f] != kFree; });
-            if (best.faces.size() < n) {
-                std::sort(best.faces.begin(), best.faces.end());
-                add(best.direction, std::move(best.faces));
-            } else {
-                for (const std::uint32_t f : best.faces)
-                    directions_[f] = static_cast<std::uint8_t>(best.direction);
-            }
-        }
-        return std::move(directions_);
-    }
-
-private:
-    static constexpr std::uint8_t kFree = 255;
-
-    std::span<const double> areas_;
-    Neighbours neighbours_;
-    std::vector<std::uint32_t> mark_; ///< 0: of no set that is looked at
-    std::uint32_t n_marks_ = 0;
-    std::vector<std::uint8_t> directions_;
-    std::priority_queue<Candidate> queue_;
-};
+    return now;
+}
 
 struct Point {
     double x = 0, y = 0;
@@ -277,17 +220,14 @@ std::vector<std::array<std::uint32_t, 3>> face_neighbours(std::span<const Triang
 std::vector<std::uint8_t> chart_directions(std::span<const Vec3> normals,
                                            std::span<const double> areas, Neighbours neighbours,
                                            const TriMesh& mesh, const AtlasSettings& settings) {
-    LargestFirst cover(areas, neighbours);
-    const double LIM = getenv("LIM") ? atof(getenv("LIM")) : std::numbers::sqrt3;
-    for (int d = 0; d < 6; ++d) {
-        std::vector<std::uint32_t> faces;
-        for (std::uint32_t f = 0; f < normals.size(); ++f)
-            if (dot(normals[f], direction_vector(d)) >= 1/LIM ||
-                dominant_direction(normals[f]) == d)
-                faces.push_back(f);
-        cover.add(d, std::move(faces));
+    const std::vector<Vec3> smooth = smoothed(normals, areas, neighbours);
+    std::vector<std::uint8_t> out(normals.size());
+    for (std::size_t f = 0; f < out.size(); ++f) {
+        int d = dominant_direction(smooth[f]);
+        if (dot(normals[f], direction_vector(d)) < 1 / std::numbers::sqrt3)
+            d = dominant_direction(normals[f]);
+        out[f] = static_cast<std::uint8_t>(d);
     }
-    std::vector<std::uint8_t> out = cover.directions();
     const double whole_m2 = std::accumulate(areas.begin(), areas.end(), 0.0);
     for (int pass = 0; pass < kMostPasses; ++pass) {
         const Patches patches = find_patches(out, neighbours);

@@ -14,8 +14,6 @@
 namespace taihu {
 namespace {
 
-constexpr int kLeastSize_px = 64;
-
 struct BakeArgs {
     SolidOptions solid;
     LevelOptions levels;
@@ -82,6 +80,39 @@ void tell(const BakeArgs& args, std::size_t j, const LodLevel& level, const Bake
                 100 * baked.used_rel, baked.relit.mean_deg, baked.relit.plain_mean_deg);
 }
 
+/// The levels as they go into the file, and their figures into the report.
+std::vector<EncodedLevel> bake_levels(const BakeArgs& args, const LodChain& chain,
+                                      const BakeSource& source, const Measure& measure,
+                                      const Console& console, nlohmann::ordered_json& report) {
+    const std::vector<double> coverages = screen_coverages(chain);
+    std::vector<EncodedLevel> out;
+    double texel_per_bound = 0; // of the first level with maps: others are seen from farther
+    for (std::size_t j = 0; j < chain.levels.size(); ++j) {
+        const LodLevel& level = chain.levels[j];
+        out.push_back(level.encoded);
+        if (!args.only || static_cast<std::size_t>(*args.only) == j) {
+            BakedLevel baked = bake_level(level, source,
+                                          {.reach_m = cage_m(args, measure, level),
+                                           .side_px = args.size_px,
+                                           .texel_m = texel_per_bound * level.bound_m,
+                                           .gutter_px = args.gutter_px,
+                                           .occlusion = !args.levels.no_ao,
+                                           .masters = !args.maps.empty()},
+                                          console.progress);
+            if (texel_per_bound == 0)
+                texel_per_bound = baked.texel_m / level.bound_m;
+            tell(args, j, level, baked, console);
+            report["levels"][j]["bytes"] = baked.encoded.draco.size();
+            report["levels"][j]["maps"] = maps_json(baked);
+            if (!args.maps.empty())
+                write_maps(args.maps, "level" + std::to_string(j), baked.maps);
+            out.back() = std::move(baked.encoded);
+        }
+        out.back().screen_coverage = coverages[j];
+    }
+    return out;
+}
+
 void run(const BakeArgs& args, const Console& console) {
     check(args, console);
     const Solid solid = read_solid(args.solid, console, Surfaces::wanted);
@@ -95,33 +126,10 @@ void run(const BakeArgs& args, const Console& console) {
         reach_m = std::max(reach_m, cage_m(args, solid.measure, level));
     const BakeSource source = bake_source(*solid.grid, *field, reach_m,
                                           lod.openness ? args.ao_rays : 0, console.progress);
-    auto report = nlohmann::ordered_json::parse(format_report(chain, base_name(args.out)));
-    const std::vector<double> coverages = screen_coverages(chain);
-    std::vector<EncodedLevel> levels;
     if (!args.maps.empty())
         std::filesystem::create_directories(args.maps);
-    for (std::size_t j = 0; j < chain.levels.size(); ++j) {
-        const LodLevel& level = chain.levels[j];
-        levels.push_back(level.encoded);
-        if (!args.only || static_cast<std::size_t>(*args.only) == j) {
-            BakedLevel baked =
-                bake_level(level, source,
-                           {.reach_m = cage_m(args, solid.measure, level),
-                            .side_px = std::max(args.size_px >> (args.only ? 0 : j),
-                                                std::min(args.size_px, 4 * kLeastSize_px)),
-                            .gutter_px = args.gutter_px,
-                            .occlusion = lod.openness,
-                            .masters = !args.maps.empty()},
-                           console.progress);
-            tell(args, j, level, baked, console);
-            report["levels"][j]["bytes"] = baked.encoded.draco.size();
-            report["levels"][j]["maps"] = maps_json(baked);
-            if (!args.maps.empty())
-                write_maps(args.maps, "level" + std::to_string(j), baked.maps);
-            levels.back() = std::move(baked.encoded);
-        }
-        levels.back().screen_coverage = coverages[j];
-    }
+    auto report = nlohmann::ordered_json::parse(format_report(chain, base_name(args.out)));
+    const auto levels = bake_levels(args, chain, source, solid.measure, console, report);
     GlbSettings glb{.recipe = format_recipe(solid.node, solid.measure.voxel_m, 0, lod)};
     if (lod.at_foot)
         glb.shift = foot_shift(chain.levels.front().certificate.box);
@@ -148,9 +156,9 @@ void add_bake(CLI::App& app, Console& console) {
         ->required();
     verb->add_option("-o,--output", args->out, "Where to write levels and maps (.glb)")->required();
     verb->add_option("--size", args->size_px,
-                     "Side of the finest level's maps, 64..8192; each further level has half "
-                     "[pixels]")
-        ->check(CLI::Range(kLeastSize_px, 8192))
+                     "Side of the finest level's maps, 64..8192; others are halved as far as "
+                     "their bounds allow [pixels]")
+        ->check(CLI::Range(64, 8192))
         ->capture_default_str();
     verb->add_option("--gutter", args->gutter_px, "Filled pixels around each chart, 1..16")
         ->check(CLI::Range(1, 16))

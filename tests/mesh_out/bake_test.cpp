@@ -91,14 +91,15 @@ TEST(SeedRow, D10AFlatPairBakesToStraightNormalsAndNoDisplacement) {
     const AnalyticField field(Box{{-1, -1, -1}, {1, 1, 1}}, [](const Vec3& p) {
         return box_distance(p, {0.5, 0.5, 0.5});
     });
-    const BakeSource fine(field, flat_shaded(cube()), 0.02, 0.1, 16);
+    const BakeSource fine(field, flat_shaded(cube()),
+                          {.voxel_m = 0.02, .reach_m = 0.1, .n_rays = 16});
     const BakedMaps maps = bake(low, fine, {.reach_m = 0.1, .side_px = 128});
     for (int y = 0; y < 128; ++y)
         for (int x = 0; x < 128; ++x) {
             const Vec3 n = pixel(maps.normal, x, y);
             ASSERT_NEAR(length(n - Vec3{0, 0, 1}), 0, 1e-5) << x << ' ' << y; // differences of 1e-9
             ASSERT_NEAR(*maps.displacement.at(x, y), 0, 1e-6);
-            ASSERT_EQ(*maps.occlusion.at(x, y), 1);
+            ASSERT_NEAR(*maps.occlusion.at(x, y), 1, 1e-6); // weights that sum to nearly 1
         }
     EXPECT_EQ(maps.n_nearest, 0u);
     const Scratch folder;
@@ -113,7 +114,7 @@ TEST(Bake, OfABumpedBallHasItsAnalyticNormalsAndLeadsOntoIt) {
     const int side = 256;
     const TexturedMesh low = textured(ball(4), side);
     const AnalyticField field(kBox, bumpy);
-    const BakeSource fine(field, ball(5), 0.01, 0.06, 4);
+    const BakeSource fine(field, ball(5), {.voxel_m = 0.01, .reach_m = 0.06, .n_rays = 4});
     const BakedMaps maps = bake(low, fine, {.reach_m = 0.06, .side_px = side});
     const auto faces = texel_faces(low, side);
     double worst_deg = 0, worst_m = 0;
@@ -142,7 +143,7 @@ TEST(Bake, NormalsOfTheTextureGiveThoseOfTheMeshBack) {
     const int side = 256;
     const TexturedMesh low = textured(ball(2), side);
     const AnalyticField field(kBox, bumpy);
-    const BakeSource fine(field, ball(4), 0.01, 0.12, 4);
+    const BakeSource fine(field, ball(4), {.voxel_m = 0.01, .reach_m = 0.12, .n_rays = 4});
     const BakedMaps maps = bake(low, fine, {.reach_m = 0.12, .side_px = side});
     const auto faces = texel_faces(low, side);
     for (int y = 0; y < side; ++y)
@@ -182,7 +183,7 @@ TEST(Bake, CurvatureAndOcclusionAreThoseOfTheSolid) {
         }
     const int side = 256;
     const TexturedMesh low = textured(mesh, side);
-    const BakeSource fine(field, mesh, 0.02, 0.05, 64);
+    const BakeSource fine(field, mesh, {.voxel_m = 0.02, .reach_m = 0.05, .n_rays = 64});
     const BakedMaps maps = bake(low, fine, {.reach_m = 0.05, .side_px = side});
     const auto faces = texel_faces(low, side);
     std::size_t n_ball = 0, n_hole = 0;
@@ -218,7 +219,9 @@ TEST(SeedRow, D10ALowModelOfAFractalRockRelitByItsMapLooksLikeTheHighOne) {
     const MeshField field(close_mesh(high, "high"));
     const int side = 512;
     const TexturedMesh coarse = textured(low, side);
-    const BakeSource fine(field, surface, 0.01, 0.15, 1);
+    const BakeSource fine(
+        field, surface,
+        {.voxel_m = 0.01, .reach_m = 0.15, .n_rays = 1, .normals = NormalsOf::surface});
     const BakedMaps maps = bake(coarse, fine, {.reach_m = 0.15, .side_px = side, .masters = false});
     const RelitError error = relit_error(coarse, fine, maps, 0.15);
     EXPECT_GT(error.n_samples, 20000u);
@@ -232,7 +235,7 @@ TEST(Bake, GutterContinuesTheChart) {
     const int side = 128;
     const TexturedMesh low = textured(ball(3), side);
     const AnalyticField field(kBox, [](const Vec3& p) { return length(p) - 1; });
-    const BakeSource fine(field, ball(4), 0.02, 0.05, 1);
+    const BakeSource fine(field, ball(4), {.voxel_m = 0.02, .reach_m = 0.05, .n_rays = 1});
     const auto texels_off = [&](int gutter_px) { // where the map is not what is beyond the gutter
         const BakedMaps maps =
             bake(low, fine, {.reach_m = 0.05, .side_px = side, .gutter_px = gutter_px});
@@ -263,7 +266,7 @@ TEST(Bake, WhatIsBeyondTheCageIsTakenFromTheNearestPlace) {
         p *= 1.1;
     const TexturedMesh low = textured(off, 128);
     const AnalyticField field(kBox, [](const Vec3& p) { return length(p) - 1; });
-    const BakeSource fine(field, ball(5), 0.02, 0.3, 1);
+    const BakeSource fine(field, ball(5), {.voxel_m = 0.02, .reach_m = 0.3, .n_rays = 1});
     const BakedMaps met = bake(low, fine, {.reach_m = 0.2, .side_px = 128});
     EXPECT_EQ(met.n_nearest, 0u);
     EXPECT_NEAR(met.rms_displacement_m, 0.1, 0.01); // faces of a coarse ball lie below it
@@ -276,7 +279,7 @@ TEST(Bake, IsTheSameOnAnyNumberOfThreads) {
     const TexturedMesh low = textured(ball(3), 128);
     const AnalyticField field(kBox, bumpy);
     const auto all = [&] {
-        const BakeSource fine(field, ball(4), 0.01, 0.06, 8);
+        const BakeSource fine(field, ball(4), {.voxel_m = 0.01, .reach_m = 0.06, .n_rays = 8});
         const BakedMaps maps = bake(low, fine, {.reach_m = 0.06, .side_px = 128});
         return std::tuple(maps.normal.pixels, maps.displacement.pixels, maps.occlusion.pixels,
                           maps.curvature.pixels, maps.rms_displacement_m,
@@ -290,7 +293,7 @@ TEST(Bake, IsTheSameOnAnyNumberOfThreads) {
 TEST(Bake, MapsComeBackFromTheirFiles) {
     const TexturedMesh low = textured(ball(3), 64);
     const AnalyticField field(kBox, bumpy);
-    const BakeSource fine(field, ball(4), 0.01, 0.06, 8);
+    const BakeSource fine(field, ball(4), {.voxel_m = 0.01, .reach_m = 0.06, .n_rays = 8});
     const BakedMaps maps = bake(low, fine, {.reach_m = 0.06, .side_px = 64});
     const Scratch folder;
     write_maps(folder.path(), "level0", maps);
@@ -321,7 +324,7 @@ TEST(Bake, MapsComeBackFromTheirFiles) {
 TEST(Bake, NamesWhatItCannotUse) {
     const TexturedMesh low = textured(ball(1), 64);
     const AnalyticField field(kBox, bumpy);
-    const BakeSource fine(field, ball(1), 0.01, 0.06, 1);
+    const BakeSource fine(field, ball(1), {.voxel_m = 0.01, .reach_m = 0.06, .n_rays = 1});
     const auto refuses = [&](const TexturedMesh& mesh, const BakeSettings& settings,
                              const char* part) {
         expect_error(Fault::bad_argument, part, [&] { bake(mesh, fine, settings); });
@@ -337,7 +340,7 @@ TEST(Bake, NamesWhatItCannotUse) {
     outside.texture[3].u = 1.5;
     refuses(outside, {.reach_m = 0.06}, "texture[3] is 1.5");
     expect_error(Fault::bad_argument, "voxel_m is 0.000000",
-                 [&] { const BakeSource none(field, ball(1), 0, 0.06, 1); });
+                 [&] { const BakeSource none(field, ball(1), {.reach_m = 0.06}); });
     const BakedMaps maps = bake(low, fine, {.reach_m = 0.06, .side_px = 64, .masters = false});
     expect_error(Fault::bad_argument, "baked without masters",
                  [&] { write_maps("nowhere", "level0", maps); });
