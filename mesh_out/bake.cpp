@@ -11,6 +11,7 @@
 #include <tbb/parallel_for.h>
 
 #include "mesh_out/closest_point_detail.h"
+#include "mesh_out/grain.h"
 #include "mesh_out/io/exr_file.h"
 #include "mesh_out/io/image_file.h"
 #include "mesh_out/openness.h"
@@ -25,8 +26,8 @@ constexpr double kGrazing_vox = 0.05; ///< where a ray that hardly gets on is ta
 constexpr double kInside = 0.01;      ///< least weight of a corner where a gutter texel is baked
 constexpr int kMostSteps = 64, kBisections = 24;
 constexpr int kMostSide_px = 8192, kMostGutter_px = 16;
-constexpr std::size_t kMostSamples = 200000; ///< of relit_error()
-constexpr std::uint32_t kPartColours = 77;   ///< stream of random numbers
+constexpr std::size_t kMostSamples = 200000;      ///< of relit_error()
+constexpr std::uint32_t kPartStream = 0x70617274; // "part"
 
 [[noreturn]] void refuse(const std::string& what) {
     throw Error(Fault::bad_argument, "bake: " + what);
@@ -233,31 +234,74 @@ double BakeSource::curvature_at(const Vec3& p) const {
     return std::clamp(sum / (2 * voxel_m_ * voxel_m_), -1 / voxel_m_, 1 / voxel_m_);
 }
 
-BakedMaps bake(const TexturedMesh& coarse, const BakeSource& fine, const BakeSettings& settings,
-               Progress* progress) {
-    const int side = settings.side_px;
-    if (side > kMostSide_px)
-        refuse("side_px is " + std::to_string(side) + ", must be 1..8192");
-    if (!(settings.reach_m > 0 && settings.reach_m <= fine.reach_m()))
-        refuse("reach_m is " + std::to_string(settings.reach_m) +
+namespace {
+
+void check(const TexturedMesh& coarse, const BakeSource& fine, const BakeSettings& s) {
+    if (s.side_px < 1 || s.side_px > kMostSide_px)
+        refuse("side_px is " + std::to_string(s.side_px) + ", must be 1..8192");
+    if (!(s.reach_m > 0 && s.reach_m <= fine.reach_m()))
+        refuse("reach_m is " + std::to_string(s.reach_m) +
                ", must be > 0 and at most that of the fine surface, " +
                std::to_string(fine.reach_m()));
-    if (settings.gutter_px < 0 || settings.gutter_px > kMostGutter_px)
-        refuse("gutter_px is " + std::to_string(settings.gutter_px) + ", must be 0..16");
+    if (s.gutter_px < 0 || s.gutter_px > kMostGutter_px)
+        refuse("gutter_px is " + std::to_string(s.gutter_px) + ", must be 0..16");
+    if (!(s.grain_m >= 0) || !std::isfinite(s.grain_m))
+        refuse("grain_m is " + std::to_string(s.grain_m) + ", must be finite and >= 0");
+    if (!(s.grain_contrast >= 0 && s.grain_contrast <= 1))
+        refuse("grain_contrast is " + std::to_string(s.grain_contrast) + ", must be 0..1");
     if (coarse.mesh.normals.size() != coarse.mesh.positions.size() ||
         coarse.tangents.size() != coarse.mesh.positions.size())
         refuse("the mesh needs a normal and a tangent for each position");
+}
+
+/// As they are where there is no face.
+BakedMaps flat_maps(const BakeSettings& s) {
+    const int all = s.side_px, masters = s.masters ? all : 0, colour = s.grain_m > 0 ? all : 0;
+    BakedMaps out{.normal = {all, all, 3},
+                  .object_normal = {masters, masters, 3},
+                  .displacement = {masters, masters, 1},
+                  .occlusion = {all, all, 1},
+                  .curvature = {masters, masters, 1},
+                  .colour = {colour, colour, 1},
+                  .part = {masters, masters, 1}};
+    for (Image* normals : {&out.normal, &out.object_normal})
+        for (std::size_t i = 2; i < normals->pixels.size(); i += 3)
+            normals->pixels[i] = 1;
+    for (Image* shares : {&out.occlusion, &out.colour})
+        std::fill(shares->pixels.begin(), shares->pixels.end(), 1.0f);
+    return out;
+}
+
+/// What the fine surface has for the texel.
+BakeSource::Place bake_texel(const TexturedMesh& coarse, std::uint32_t face, int x, int y,
+                             const BakeSource& fine, const BakeSettings& s, BakedMaps& out) {
+    const Frame frame =
+        frame_at(coarse, face, held(texture_weights(coarse, face, x + 0.5, y + 0.5, s.side_px)));
+    const BakeSource::Place place = fine.meet(frame.point, frame.normal, s.reach_m);
+    set(out.normal, x, y, frame.local(place.normal));
+    *out.occlusion.at(x, y) = static_cast<float>(fine.openness_at(place.point));
+    if (s.grain_m > 0)
+        *out.colour.at(x, y) =
+            static_cast<float>(1 - s.grain_contrast * grain(place.point, s.grain_m));
+    if (s.masters) {
+        set(out.object_normal, x, y, place.normal);
+        *out.displacement.at(x, y) = static_cast<float>(place.offset_m);
+        *out.curvature.at(x, y) = static_cast<float>(fine.curvature_at(place.point));
+        *out.part.at(x, y) = static_cast<float>(place.primitive);
+    }
+    return place;
+}
+
+} // namespace
+
+BakedMaps bake(const TexturedMesh& coarse, const BakeSource& fine, const BakeSettings& settings,
+               Progress* progress) {
+    check(coarse, fine, settings);
+    const int side = settings.side_px;
     const std::vector<std::uint32_t> on_face = texel_faces(coarse, side);
     std::vector<std::uint32_t> owners = on_face;
     grow(owners, side, settings.gutter_px);
-
-    const int masters_px = settings.masters ? side : 0;
-    BakedMaps out{.normal = {side, side, 3},
-                  .object_normal = {masters_px, masters_px, 3},
-                  .displacement = {masters_px, masters_px, 1},
-                  .occlusion = {side, side, 1},
-                  .curvature = {masters_px, masters_px, 1},
-                  .part = {masters_px, masters_px, 1}};
+    BakedMaps out = flat_maps(settings);
     struct Row {
         std::size_t n = 0, n_nearest = 0;
         double squares = 0, most = 0;
@@ -270,31 +314,15 @@ BakedMaps bake(const TexturedMesh& coarse, const BakeSource& fine, const BakeSet
         for (int x = 0; x < side; ++x) {
             const std::size_t texel = static_cast<std::size_t>(y) * static_cast<std::size_t>(side) +
                                       static_cast<std::size_t>(x);
-            const std::uint32_t face = owners[texel];
-            if (face == kNoFace) {
-                set(out.normal, x, y, {0, 0, 1});
-                *out.occlusion.at(x, y) = 1;
-                if (settings.masters)
-                    set(out.object_normal, x, y, {0, 0, 1});
+            if (owners[texel] == kNoFace)
                 continue;
-            }
-            const Frame frame =
-                frame_at(coarse, face, held(texture_weights(coarse, face, x + 0.5, y + 0.5, side)));
-            const BakeSource::Place place = fine.meet(frame.point, frame.normal, settings.reach_m);
-            set(out.normal, x, y, frame.local(place.normal));
-            *out.occlusion.at(x, y) = static_cast<float>(fine.openness_at(place.point));
-            if (settings.masters) {
-                set(out.object_normal, x, y, place.normal);
-                *out.displacement.at(x, y) = static_cast<float>(place.offset_m);
-                *out.curvature.at(x, y) = static_cast<float>(fine.curvature_at(place.point));
-                *out.part.at(x, y) = static_cast<float>(place.primitive);
-            }
-            if (on_face[texel] != kNoFace) {
-                ++row.n;
-                row.n_nearest += !place.is_traced;
-                row.squares += place.offset_m * place.offset_m;
-                row.most = std::max(row.most, std::fabs(place.offset_m));
-            }
+            const auto place = bake_texel(coarse, owners[texel], x, y, fine, settings, out);
+            if (on_face[texel] == kNoFace)
+                continue; // a gutter's
+            ++row.n;
+            row.n_nearest += !place.is_traced;
+            row.squares += place.offset_m * place.offset_m;
+            row.most = std::max(row.most, std::fabs(place.offset_m));
         }
         if (const int done = ++n_done; done % (side / 100 + 1) == 0)
             report_fraction(progress, double(done) / side);
@@ -316,6 +344,10 @@ std::string normal_png(const BakedMaps& maps) {
 
 std::string occlusion_png(const BakedMaps& maps) {
     return format_png(maps.occlusion, PngValues::data, "occlusion map");
+}
+
+std::string colour_png(const BakedMaps& maps) {
+    return format_png(maps.colour, PngValues::light, "colour map");
 }
 
 RelitError relit_error(const TexturedMesh& coarse, const BakeSource& fine, const BakedMaps& maps,
@@ -380,7 +412,7 @@ void write_maps(const std::filesystem::path& folder, const std::string& stem,
     for (std::size_t i = 0; i < maps.part.pixels.size(); ++i) {
         const auto part = static_cast<std::uint64_t>(maps.part.pixels[i]);
         for (std::uint32_t c = 0; c < 3; ++c)
-            parts.pixels[4 * i + c] = static_cast<float>(Rng{0, kPartColours}.uniform(part, c));
+            parts.pixels[4 * i + c] = static_cast<float>(Rng{0, kPartStream}.uniform(part, c));
         parts.pixels[4 * i + 3] = maps.part.pixels[i];
     }
     write("normal", maps.normal, ExrSamples::half,
@@ -389,6 +421,9 @@ void write_maps(const std::filesystem::path& folder, const std::string& stem,
           {{"quantity", "normal"}, {"frame", "x, y, z of the mesh, +Y up"}, {"unit", "1"}});
     write("occlusion", maps.occlusion, ExrSamples::half,
           {{"quantity", "share of the sky that is seen"}, {"unit", "1"}});
+    if (!maps.colour.pixels.empty())
+        write("colour", maps.colour, ExrSamples::half,
+              {{"quantity", "share of the base colour"}, {"unit", "1"}});
     write("displacement", maps.displacement, ExrSamples::full,
           {{"quantity", "displacement along the normal"}, {"unit", "m"}, {"scale", "1"}});
     write("curvature", maps.curvature, ExrSamples::full,

@@ -66,10 +66,12 @@ private:
 };
 
 struct BakeSettings {
-    double reach_m = 0;  ///< cage: how far along a normal the fine surface is sought, > 0
-    int side_px = 2048;  ///< of the maps, 1..8192: what the texture points were made for
-    int gutter_px = 3;   ///< texels beyond the faces that are filled too, 0..16
-    bool masters = true; ///< false: tangent-space normals and occlusion alone
+    double reach_m = 0;          ///< cage: how far along a normal the fine surface is sought, > 0
+    int side_px = 2048;          ///< of the maps, 1..8192: what the texture points were made for
+    int gutter_px = 3;           ///< texels beyond the faces that are filled too, 0..16
+    bool masters = true;         ///< false: what a GLB holds alone
+    double grain_m = 0;          ///< size of the grains that the colour shows; 0: none
+    double grain_contrast = 0.4; ///< how much darker the darkest is than the brightest, 0..1
 };
 
 /// Maps of one mesh; square, the first row is v = 1. Beyond the gutter the surface is flat: normal
@@ -80,6 +82,7 @@ struct BakedMaps {
     Image displacement;        ///< 1: from the coarse surface along its normal [m]
     Image occlusion;           ///< 1: share of the sky that is seen, 0..1
     Image curvature;           ///< 1: mean curvature, positive where convex [1/m]
+    Image colour;              ///< 1: share of the base colour that a grain has, or empty
     Image part;                ///< 1: number of the field's primitive, as holes and base have them
     std::size_t n_texels = 0;  ///< whose middle lies on a face
     std::size_t n_nearest = 0; ///< of those, where nothing was met along the normal
@@ -96,9 +99,11 @@ struct BakedMaps {
 BakedMaps bake(const TexturedMesh& coarse, const BakeSource& fine, const BakeSettings& settings,
                Progress* progress = nullptr);
 
-/// The bytes of an 8-bit PNG for glTF's normalTexture, (n + 1) / 2, or occlusionTexture.
+/// The bytes of an 8-bit PNG for glTF's normalTexture, (n + 1) / 2, occlusionTexture, or
+/// baseColorTexture.
 std::string normal_png(const BakedMaps& maps);
 std::string occlusion_png(const BakedMaps& maps);
+std::string colour_png(const BakedMaps& maps);
 
 /// How far normals are off those of the fine surface, on average over the texels: as lit through
 /// an 8-bit normal map, read with bilinear filter at corners of texels, where that is worst, and by
@@ -111,9 +116,9 @@ RelitError relit_error(const TexturedMesh& coarse, const BakeSource& fine, const
                        double reach_m, Progress* progress = nullptr);
 
 /// Master maps as EXR: STEM_normal, STEM_object_normal, STEM_occlusion (half), STEM_displacement,
-/// STEM_curvature, STEM_part (float); channels R, G, B or Y, of parts also R, G, B as colours that
-/// tell them apart. Attributes say what the numbers are: `quantity`, `unit`, `frame`.
-/// \throws Error bad_argument: maps baked without masters; io.
+/// STEM_curvature, STEM_part (float), and STEM_colour (half) where there is one; channels R, G, B
+/// or Y, of parts also R, G, B as colours that tell them apart. Attributes say what the numbers
+/// are: `quantity`, `unit`, `frame`. \throws Error bad_argument: maps baked without masters; io.
 void write_maps(const std::filesystem::path& folder, const std::string& stem,
                 const BakedMaps& maps);
 

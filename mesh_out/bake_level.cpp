@@ -55,13 +55,17 @@ BakedLevel bake_level(const LodLevel& level, const BakeSource& fine,
                     {.reach_m = settings.reach_m,
                      .side_px = atlas.side_px,
                      .gutter_px = settings.gutter_px,
-                     .masters = settings.masters},
+                     .masters = settings.masters,
+                     .grain_m = settings.grain_m,
+                     .grain_contrast = settings.grain_contrast},
                     progress);
     report_stage(progress, "judging the maps");
     out.relit = relit_error(decoded, fine, out.maps, settings.reach_m, progress);
     out.encoded.normal_png = normal_png(out.maps);
     if (settings.occlusion)
         out.encoded.occlusion_png = occlusion_png(out.maps);
+    if (settings.grain_m > 0)
+        out.encoded.colour_png = colour_png(out.maps);
     return out;
 }
 

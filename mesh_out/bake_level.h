@@ -8,10 +8,12 @@
 namespace taihu {
 
 struct BakeLevelSettings {
-    double reach_m = 0;    ///< cage, as in BakeSettings
-    int side_px = 2048;    ///< of the maps, 64..8192,
-    double texel_m = 0;    ///< halved while no texel is larger than this; 0: as it is
-    int gutter_px = 3;     ///< around each chart, 1..16
+    double reach_m = 0; ///< cage, as in BakeSettings
+    int side_px = 2048; ///< of the maps, 64..8192,
+    double texel_m = 0; ///< halved while no texel is larger than this; 0: as it is
+    int gutter_px = 3;  ///< around each chart, 1..16
+    double grain_m = 0; ///< as in BakeSettings
+    double grain_contrast = 0.4;
     bool occlusion = true; ///< an occlusion texture in the file
     bool masters = true;   ///< all maps, else those of the file alone
 };

@@ -18,7 +18,8 @@ struct BakeArgs {
     SolidOptions solid;
     LevelOptions levels;
     std::filesystem::path out, maps, report;
-    std::string cage;
+    std::string cage, grain;
+    double grain_contrast = BakeLevelSettings{}.grain_contrast;
     int size_px = 2048, gutter_px = 3, ao_rays = 64;
     std::optional<int> only;
 };
@@ -86,6 +87,7 @@ std::vector<EncodedLevel> bake_levels(const BakeArgs& args, const LodChain& chai
                                       const Console& console, nlohmann::ordered_json& report) {
     const std::vector<double> coverages = screen_coverages(chain);
     std::vector<EncodedLevel> out;
+    const double grain_m = args.grain.empty() ? 0 : length_m("--grain", args.grain, measure);
     double texel_per_bound = 0; // of the first level with maps: others are seen from farther
     for (std::size_t j = 0; j < chain.levels.size(); ++j) {
         const LodLevel& level = chain.levels[j];
@@ -96,6 +98,8 @@ std::vector<EncodedLevel> bake_levels(const BakeArgs& args, const LodChain& chai
                                            .side_px = args.size_px,
                                            .texel_m = texel_per_bound * level.bound_m,
                                            .gutter_px = args.gutter_px,
+                                           .grain_m = grain_m,
+                                           .grain_contrast = args.grain_contrast,
                                            .occlusion = !args.levels.no_ao,
                                            .masters = !args.maps.empty()},
                                           console.progress);
@@ -166,11 +170,18 @@ void add_bake(CLI::App& app, Console& console) {
     verb->add_option("--cage", args->cage,
                      "How far along its normals a level looks for the fine surface, as 3mm or "
                      "10vox [a voxel and twice the level's bound]");
+    auto* grains = verb->add_option("--grain", args->grain,
+                                    "Colour map with grains of this size, as 5mm [none]");
+    verb->add_option("--grain-contrast", args->grain_contrast,
+                     "How much darker the darkest grain is than the brightest, 0..1")
+        ->check(CLI::Range(0.0, 1.0))
+        ->needs(grains)
+        ->capture_default_str();
     verb->add_option("--only", args->only, "Maps for this level alone, 0 is the finest")
         ->check(CLI::Range(0, 7));
     verb->add_option("--maps", args->maps,
                      "Folder for all maps as EXR: normals in tangent and object space, "
-                     "displacement, occlusion, curvature, parts");
+                     "displacement, occlusion, curvature, parts, colour");
     verb->add_option("--ao-rays", args->ao_rays, "Rays for occlusion at each place, 1..4096")
         ->check(CLI::Range(1, 4096))
         ->capture_default_str();

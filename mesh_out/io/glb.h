@@ -19,7 +19,7 @@ struct EncodedLevel {
     // With a texture, one of these per position of `decoded`; else empty.
     std::vector<TexturePoint> texture;
     std::vector<Vec3> tangents;
-    std::string normal_png, occlusion_png; ///< its images, or empty
+    std::string normal_png, occlusion_png, colour_png; ///< its images, or empty
 };
 
 /// Compress with Draco's ExpertEncoder: edgebreaker, positions on `grid` without loss, normals
@@ -53,7 +53,7 @@ struct GlbSettings {
 
 /// A GLB of Draco levels, finest first: KHR_draco_mesh_compression (required), openness as COLOR_0,
 /// which viewers multiply the base colour with, texture points as TEXCOORD_0, tangents as TANGENT
-/// and the images as normalTexture and occlusionTexture of a material of the level's own, and with
+/// and the images as normalTexture, occlusionTexture and baseColorTexture of a material of the level's own, and with
 /// more than one level MSFT_lod on the first node and MSFT_screencoverage in its extras. Accessor
 /// counts, minima and maxima are those of the decoded arrays. The same input gives the same bytes.
 std::string format_glb(std::span<const EncodedLevel> levels, const GlbSettings& settings = {});

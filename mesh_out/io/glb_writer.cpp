@@ -128,10 +128,14 @@ Json add_texture(Assembly& glb, const std::string& png) {
     return {{"index", glb.json["textures"].size() - 1}};
 }
 
+bool has_images(const EncodedLevel& level) {
+    return !level.normal_png.empty() || !level.occlusion_png.empty() || !level.colour_png.empty();
+}
+
 /// Of levels without images, one for all; of others, one each. Returns its index.
 std::size_t add_material(Assembly& glb, const EncodedLevel& level, const GlbSettings& settings,
                          std::optional<std::size_t>& plain) {
-    const bool is_plain = level.normal_png.empty() && level.occlusion_png.empty();
+    const bool is_plain = !has_images(level);
     if (is_plain && plain)
         return *plain;
     Json material = {{"pbrMetallicRoughness",
@@ -143,6 +147,8 @@ std::size_t add_material(Assembly& glb, const EncodedLevel& level, const GlbSett
         material["normalTexture"] = add_texture(glb, level.normal_png);
     if (!level.occlusion_png.empty())
         material["occlusionTexture"] = add_texture(glb, level.occlusion_png);
+    if (!level.colour_png.empty())
+        material["pbrMetallicRoughness"]["baseColorTexture"] = add_texture(glb, level.colour_png);
     glb.json["materials"].push_back(std::move(material));
     const std::size_t index = glb.json["materials"].size() - 1;
     if (is_plain)
@@ -194,8 +200,7 @@ void check_levels(std::span<const EncodedLevel> levels, const GlbSettings& setti
             fail("levels[" + std::to_string(i) + "] is empty", "make it by encode_draco()");
     for (std::size_t i = 0; i < levels.size(); ++i)
         if (levels[i].texture.size() != levels[i].tangents.size() ||
-            (levels[i].texture.empty() &&
-             !(levels[i].normal_png.empty() && levels[i].occlusion_png.empty())))
+            (levels[i].texture.empty() && has_images(levels[i])))
             fail("levels[" + std::to_string(i) + "] has images without texture points",
                  "encode it with its texture");
     if (!(settings.roughness >= 0 && settings.roughness <= 1))

@@ -6,9 +6,12 @@
 #include <gmock/gmock.h>
 #include <tbb/global_control.h>
 
+#include "mesh_out/bump.h"
 #include "mesh_out/chart_atlas.h"
+#include "mesh_out/grain.h"
 #include "mesh_out/io/exr_file.h"
 #include "mesh_out/io/image_file.h"
+#include "mesh_out/io/mesh_file.h"
 #include "stats/core/file.h"
 #include "tests/support/cube_mesh.h"
 #include "tests/support/errors.h"
@@ -19,6 +22,7 @@
 #include "vdb_ops/fractal_rock.h"
 #include "vdb_ops/icosphere.h"
 #include "vdb_ops/mesh_field.h"
+#include "vdb_ops/region_relief.h"
 
 namespace taihu {
 namespace {
@@ -229,6 +233,96 @@ TEST(SeedRow, D10ALowModelOfAFractalRockRelitByItsMapLooksLikeTheHighOne) {
     EXPECT_GT(error.plain_mean_deg, 2 * error.mean_deg);
     RecordProperty("mean_deg", std::to_string(error.mean_deg));
     RecordProperty("plain_mean_deg", std::to_string(error.plain_mean_deg));
+}
+
+TEST(SeedRow, T16BumpsLeaveTheSilhouetteOfABallAndDisplacementDoesNot) {
+    const TriMesh plain = ball(5);
+    for (const RegionLaw law : {RegionLaw::convex, RegionLaw::concave}) {
+        const RegionPlane plane{
+            .size_px = 256, .pixel_m = 1.0 / 256, .n_regions = 40, .tileable = true, .seed = 4};
+        const Image heights = region_relief(plane, {.law = law}).heights;
+        TriMesh bumped = plain, displaced = plain;
+        bumped.normals =
+            bumped_normals(plain, bump_offsets(heights, MapBorder::wrap), bounds(plain), 64, 2);
+        const auto places = texture_coordinates(plain, TextureMap::spherical, bounds(plain));
+        for (std::size_t f = 0; f < plain.triangles.size(); ++f)
+            for (std::size_t k = 0; k < 3; ++k) {
+                const auto [u, v] = places.corners[f][k];
+                const int x = int(u * 512) % 256, y = int((1 - v) * 511) % 256;
+                const std::uint32_t i = plain.triangles[f][k];
+                displaced.positions[i] = plain.positions[i] * (1 + *heights.at(x, y));
+            }
+        const auto stored = [](const TriMesh& mesh) {
+            return parse_mesh(format_mesh(mesh, MeshFormat::glb), MeshFormat::glb, "ball")
+                .levels.front();
+        };
+        EXPECT_EQ(stored(bumped).positions, stored(plain).positions);
+        EXPECT_NE(stored(displaced).positions, stored(plain).positions);
+        // The outline as seen along Z: how far out it is, by angle.
+        const auto outline = [](const TriMesh& mesh) {
+            std::vector<double> far(36);
+            for (const Vec3& p : mesh.positions) {
+                const double turn = std::atan2(p.y, p.x) / (2 * std::numbers::pi) + 0.5;
+                double& r = far[static_cast<std::size_t>(turn * 36) % 36];
+                r = std::max(r, std::hypot(p.x, p.y));
+            }
+            const auto [lo, hi] = std::minmax_element(far.begin(), far.end());
+            return *hi - *lo;
+        };
+        EXPECT_LT(outline(bumped), 0.01); // of an icosphere's own corners
+        EXPECT_GT(outline(displaced), 0.02);
+        double lean_deg = 0;
+        for (std::size_t i = 0; i < plain.normals.size(); ++i)
+            lean_deg += std::acos(std::min(1.0, dot(plain.normals[i], bumped.normals[i]))) * 180 /
+                        std::numbers::pi / static_cast<double>(plain.normals.size());
+        EXPECT_GT(lean_deg, 5); // and yet it shows
+    }
+}
+
+TEST(SeedRow, D14GrainsAreABaseColourUnderTheNormalMap) {
+    const int side = 128;
+    const TexturedMesh low = textured(ball(3), side);
+    const AnalyticField field(kBox, bumpy);
+    const BakeSource fine(field, ball(4), {.voxel_m = 0.01, .reach_m = 0.06, .n_rays = 1});
+    const BakedMaps maps =
+        bake(low, fine, {.reach_m = 0.06, .side_px = side, .grain_m = 0.2, .grain_contrast = 0.5});
+    const auto faces = texel_faces(low, side);
+    std::size_t n_same = 0, n = 0;
+    float least = 1, most = 0;
+    for (int y = 0; y < side; ++y)
+        for (int x = 1; x < side; ++x)
+            if (faces[static_cast<std::size_t>(y * side + x)] != kNoFace &&
+                faces[static_cast<std::size_t>(y * side + x - 1)] != kNoFace) {
+                n_same += *maps.colour.at(x, y) == *maps.colour.at(x - 1, y);
+                least = std::min(least, *maps.colour.at(x, y));
+                most = std::max(most, *maps.colour.at(x, y));
+                ++n;
+            }
+    EXPECT_GT(n_same, 0.6 * static_cast<double>(n)); // grains of some six texels
+    EXPECT_LT(n_same, 0.95 * static_cast<double>(n));
+    EXPECT_NEAR(least, 0.5, 0.02); // hundreds of grains, evenly between
+    EXPECT_NEAR(most, 1, 0.02);
+    const Scratch folder;
+    write_file(folder / "colour.png", colour_png(maps));
+    const Image back = read_png(folder / "colour.png");
+    for (std::size_t i = 0; i < back.pixels.size(); ++i)
+        ASSERT_NEAR(back.pixels[i], maps.colour.pixels[i], 0.005); // a step of sRGB at white
+}
+
+TEST(Grain, HasOneNumberAndNoSeamAcrossCubes) {
+    const double size_m = 0.1;
+    std::size_t n_changes = 0;
+    double sum = 0;
+    for (int i = 0; i < 20000; ++i) {
+        const Vec3 p{i * 1e-3 - 10, 0.3, -0.2};
+        sum += grain(p, size_m) / 20000;
+        n_changes += grain(p, size_m) != grain(p + Vec3{1e-3, 0, 0}, size_m);
+    }
+    EXPECT_NEAR(sum, 0.5, 0.1); // some 280 grains along the line: 5 standard errors
+    // Cells of a Poisson process of one point a cube are passed 1.455 times a length of a cube;
+    // points in cubes are more regular.
+    EXPECT_NEAR(static_cast<double>(n_changes) / 200, 1.4, 0.15);
+    EXPECT_NE(grain({1, 2, 3}, size_m, 1), grain({1, 2, 3}, size_m, 2));
 }
 
 TEST(Bake, GutterContinuesTheChart) {

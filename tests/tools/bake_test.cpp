@@ -78,11 +78,21 @@ TEST_F(Bake, OneLevelAloneLeavesTheOthersWithVertexColours) {
 }
 
 TEST_F(Bake, WithoutOcclusionThereIsOneImage) {
-    result("taihu bake rock.vdb --levels 1 --max-error 1vox --size 128 --no-ao -o rock.glb",
+    result("taihu bake rock.vdb --levels 1 --max-error 1vox --size 128 --no-ao "
+           "-o rock.glb",
            scratch_);
     const json glb = glb_json("rock.glb");
     EXPECT_EQ(glb["images"].size(), 1u);
     EXPECT_FALSE(glb["materials"][0].contains("occlusionTexture"));
+}
+
+TEST_F(Bake, GrainsAreABaseColour) {
+    result("taihu bake rock.vdb --levels 1 --max-error 1vox --size 128 --no-ao --grain 2cm "
+           "-o rock.glb",
+           scratch_);
+    const json glb = glb_json("rock.glb");
+    EXPECT_EQ(glb["images"].size(), 2u);
+    EXPECT_TRUE(glb["materials"][0]["pbrMetallicRoughness"].contains("baseColorTexture"));
 }
 
 TEST_F(Bake, GivesTheSameBytesOnAnyNumberOfThreads) {
