@@ -84,6 +84,7 @@ int stop_signal();
 void catch_stop_signals();
 
 // One function a verb, each in the file of its name.
+void add_bake(CLI::App& app, Console& console);
 void add_carve(CLI::App& app, Console& console);
 void add_check(CLI::App& app, Console& console);
 void add_fit(CLI::App& app, Console& console);

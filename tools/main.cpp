@@ -86,6 +86,7 @@ int run(int argc, char** argv) {
     add_rock(app, console);
     add_mesh(app, console);
     add_lod(app, console);
+    add_bake(app, console);
     add_check(app, console);
     add_measure(app, console);
     add_section(app, console);

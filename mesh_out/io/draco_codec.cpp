@@ -22,7 +22,7 @@
 namespace taihu {
 namespace {
 
-constexpr int kNormalBits = 10, kSpeed = 3;
+constexpr int kNormalBits = 10, kTangentBits = 8, kSpeed = 3, kMostTextureBits = 18;
 constexpr const char* kRecipeKey = "taihu_recipe";
 /// A stream may claim this many faces whatever its length, and 64 more for each of its bytes: far
 /// more than any real mesh has, and little enough to allocate.
@@ -86,18 +86,63 @@ draco::Options quantization(const PositionGrid& grid, int exponent) {
     return options;
 }
 
-int add_vectors(draco::Mesh& mesh, draco::GeometryAttribute::Type type,
-                const std::vector<Vec3>& vectors) {
-    draco::GeometryAttribute attribute;
-    attribute.Init(type, nullptr, 3, draco::DT_FLOAT32, false, 3 * sizeof(float), 0);
-    const int id = mesh.AddAttribute(attribute, true, static_cast<std::uint32_t>(vectors.size()));
-    for (std::size_t i = 0; i < vectors.size(); ++i) {
-        const float v[3] = {static_cast<float>(vectors[i].x), static_cast<float>(vectors[i].y),
-                            static_cast<float>(vectors[i].z)};
-        mesh.attribute(id)->SetAttributeValue(
-            draco::AttributeValueIndex(static_cast<std::uint32_t>(i)), v);
+/// Which points share a value: the point that has it, for each value, and the value of each point.
+struct SharedValues {
+    std::vector<std::uint32_t> first, of_point;
+};
+
+/// Points of equal positions (and normals) share one value: Draco takes its connectivity from
+/// that, which then has no border along seams of a texture.
+SharedValues shared_values(const TriMesh& mesh, bool normals) {
+    const auto key = [&](std::uint32_t i) {
+        const Vec3 &p = mesh.positions[i], n = normals ? mesh.normals[i] : Vec3{};
+        return std::array{p.x, p.y, p.z, n.x, n.y, n.z};
+    };
+    std::vector<std::uint32_t> order(mesh.positions.size());
+    for (std::uint32_t i = 0; i < order.size(); ++i)
+        order[i] = i;
+    std::sort(order.begin(), order.end(), [&](std::uint32_t a, std::uint32_t b) {
+        const auto x = key(a), y = key(b);
+        return x != y ? x < y : a < b;
+    });
+    std::vector<std::uint32_t> leader(order.size());
+    for (std::size_t i = 0; i < order.size(); ++i)
+        leader[order[i]] =
+            i > 0 && key(order[i]) == key(order[i - 1]) ? leader[order[i - 1]] : order[i];
+    SharedValues out;
+    out.of_point.resize(order.size());
+    for (std::uint32_t i = 0; i < order.size(); ++i) { // values in the order of their points
+        if (leader[i] == i) {
+            out.of_point[i] = static_cast<std::uint32_t>(out.first.size());
+            out.first.push_back(i);
+        } else {
+            out.of_point[i] = out.of_point[leader[i]];
+        }
     }
+    return out;
+}
+
+/// One value per point, or those that are shared. Returns the attribute's number.
+template <std::size_t N, class NumbersOf>
+int add_floats(draco::Mesh& mesh, draco::GeometryAttribute::Type type, NumbersOf&& numbers_of,
+               const SharedValues* shared = nullptr) {
+    draco::GeometryAttribute attribute;
+    attribute.Init(type, nullptr, N, draco::DT_FLOAT32, false, N * sizeof(float), 0);
+    const std::uint32_t n =
+        shared ? static_cast<std::uint32_t>(shared->first.size()) : mesh.num_points();
+    const int id = mesh.AddAttribute(attribute, !shared, n);
+    for (std::uint32_t i = 0; i < n; ++i) {
+        const std::array<float, N> v = numbers_of(shared ? shared->first[i] : i);
+        mesh.attribute(id)->SetAttributeValue(draco::AttributeValueIndex(i), v.data());
+    }
+    for (std::uint32_t i = 0; shared && i < mesh.num_points(); ++i)
+        mesh.attribute(id)->SetPointMapEntry(draco::PointIndex(i),
+                                             draco::AttributeValueIndex(shared->of_point[i]));
     return id;
+}
+
+std::array<float, 3> floats(const Vec3& v) {
+    return {static_cast<float>(v.x), static_cast<float>(v.y), static_cast<float>(v.z)};
 }
 
 /// Grey, because that is what viewers multiply a material with.
@@ -113,15 +158,38 @@ void add_colours(draco::Mesh& mesh, const std::vector<float>& openness) {
     }
 }
 
-std::unique_ptr<draco::Mesh> to_draco(const TriMesh& mesh, const std::string& recipe) {
+/// \param textured  the same mesh with its texture, or null.
+std::unique_ptr<draco::Mesh> to_draco(const TriMesh& mesh, const TexturedMesh* textured,
+                                      const std::string& recipe) {
     auto made = std::make_unique<draco::Mesh>(); // it can be neither copied nor moved
     draco::Mesh& out = *made;
     out.set_num_points(static_cast<std::uint32_t>(mesh.positions.size()));
-    add_vectors(out, draco::GeometryAttribute::POSITION, mesh.positions);
+    SharedValues positions, normals;
+    if (textured) {
+        positions = shared_values(mesh, false);
+        normals = shared_values(mesh, !mesh.normals.empty());
+    }
+    add_floats<3>(
+        out, draco::GeometryAttribute::POSITION,
+        [&](std::uint32_t i) { return floats(mesh.positions[i]); },
+        textured ? &positions : nullptr);
     if (!mesh.normals.empty())
-        add_vectors(out, draco::GeometryAttribute::NORMAL, mesh.normals);
+        add_floats<3>(
+            out, draco::GeometryAttribute::NORMAL,
+            [&](std::uint32_t i) { return floats(mesh.normals[i]); },
+            textured ? &normals : nullptr);
     if (!mesh.openness.empty())
         add_colours(out, mesh.openness);
+    if (textured) {
+        add_floats<2>(out, draco::GeometryAttribute::TEX_COORD, [&](std::uint32_t i) {
+            const auto [u, v] = textured->texture[i]; // glTF's v runs downwards
+            return std::array{static_cast<float>(u), static_cast<float>(1 - v)};
+        });
+        add_floats<4>(out, draco::GeometryAttribute::GENERIC, [&](std::uint32_t i) {
+            const auto [x, y, z] = floats(textured->tangents[i]);
+            return std::array{x, y, z, 1.0f};
+        });
+    }
     if (!recipe.empty()) {
         auto metadata = std::make_unique<draco::GeometryMetadata>();
         metadata->AddEntryString(kRecipeKey, recipe);
@@ -233,6 +301,25 @@ std::unique_ptr<draco::Mesh> decode(std::string_view bytes, const std::string& w
 
 } // namespace
 
+TexturedMesh decode_textured_draco(std::string_view bytes, const std::string& where) {
+    TexturedMesh out;
+    out.mesh = decode_draco_mesh(bytes, where).mesh;
+    const auto decoded = decode(bytes, where);
+    const auto* texture = decoded->GetNamedAttribute(draco::GeometryAttribute::TEX_COORD);
+    const auto* tangents = decoded->GetNamedAttribute(draco::GeometryAttribute::GENERIC);
+    if (!texture || !tangents || texture->num_components() != 2 || tangents->num_components() != 4)
+        fail(where, "the Draco stream has no texture points and tangents");
+    for (std::uint32_t i = 0; i < decoded->num_points(); ++i) {
+        float uv[2] = {}, t[4] = {};
+        if (!texture->ConvertValue<float, 2>(texture->mapped_index(draco::PointIndex(i)), uv) ||
+            !tangents->ConvertValue<float, 4>(tangents->mapped_index(draco::PointIndex(i)), t))
+            fail(where, "the Draco stream has a broken attribute");
+        out.texture.push_back({uv[0], 1 - double{uv[1]}});
+        out.tangents.push_back(normalized({t[0], t[1], t[2]}));
+    }
+    return out;
+}
+
 DracoMesh decode_draco_mesh(std::string_view bytes, const std::string& where) {
     const auto decoded = decode(bytes, where);
     const auto* positions = decoded->GetNamedAttribute(draco::GeometryAttribute::POSITION);
@@ -274,11 +361,56 @@ TriMesh decode_draco(std::string_view bytes, const std::string& where) {
     return decode_draco_mesh(bytes, where).mesh;
 }
 
-EncodedLevel encode_draco(const TriMesh& mesh, const PositionGrid& grid,
-                          const std::string& recipe) {
+namespace {
+
+/// The bits of the coarsest grid of 0..1 that all texture points lie on.
+int texture_bits(const TexturedMesh& textured) {
+    const TriMesh& mesh = textured.mesh;
+    const auto refuse = [](const std::string& what) {
+        throw Error(Fault::bad_argument, "encode_draco: " + what);
+    };
+    if (textured.texture.size() != mesh.positions.size() ||
+        textured.tangents.size() != mesh.positions.size())
+        refuse("give a texture point and a tangent for each position");
+    int bits = 1;
+    for (std::size_t i = 0; i < textured.texture.size(); ++i)
+        for (const double t : {textured.texture[i].u, 1 - textured.texture[i].v}) {
+            const auto off = [&] { return std::ldexp(t, bits) != std::floor(std::ldexp(t, bits)); };
+            while (bits <= kMostTextureBits && off())
+                ++bits;
+            if (bits > kMostTextureBits || !(t >= 0 && t < 1))
+                refuse("texture[" + std::to_string(i) +
+                       "] is on no grid of 18 bits within 0..1; make it by chart_atlas()");
+        }
+    return bits;
+}
+
+/// Faces with their texture points, for sorted_faces().
+using TexturedFace = std::array<std::array<double, 5>, 3>;
+
+std::vector<TexturedFace> sorted_faces(const TexturedMesh& textured) {
+    std::vector<TexturedFace> faces;
+    for (const Triangle& t : textured.mesh.triangles) {
+        TexturedFace face;
+        for (std::size_t k = 0; k < 3; ++k) {
+            const Vec3& p = textured.mesh.positions[t[k]];
+            const TexturePoint& at = textured.texture[t[k]];
+            face[k] = {p.x, p.y, p.z, at.u, at.v};
+        }
+        std::rotate(face.begin(), std::min_element(face.begin(), face.end()), face.end());
+        faces.push_back(face);
+    }
+    std::sort(faces.begin(), faces.end());
+    return faces;
+}
+
+/// \param textured  the same mesh with its texture, or null.
+EncodedLevel encode(const TriMesh& mesh, const TexturedMesh* textured, const PositionGrid& grid,
+                    const std::string& recipe) {
     check_writable(mesh, "encode_draco");
     const int exponent = check_on_grid(mesh, grid);
-    const auto source = to_draco(mesh, recipe);
+    const int bits = textured ? texture_bits(*textured) : 0;
+    const auto source = to_draco(mesh, textured, recipe);
     draco::ExpertEncoder encoder(*source);
     encoder.SetEncodingMethod(draco::MESH_EDGEBREAKER_ENCODING);
     encoder.SetSpeedOptions(kSpeed, kSpeed);
@@ -286,6 +418,14 @@ EncodedLevel encode_draco(const TriMesh& mesh, const PositionGrid& grid,
     encoder.options().SetAttributeOptions(kDracoPositionId, quantization(grid, exponent));
     if (!mesh.normals.empty())
         encoder.SetAttributeQuantization(kDracoNormalId, kNormalBits);
+    if (textured) {
+        draco::Options exact; // a step of 2^-bits, as in quantization()
+        exact.SetInt("quantization_bits", bits);
+        exact.SetString("quantization_origin", "0 0");
+        exact.SetString("quantization_range", hex_float(std::ldexp(1.0, bits) - 1, -bits));
+        encoder.options().SetAttributeOptions(static_cast<int>(draco_texture_id(mesh)), exact);
+        encoder.SetAttributeQuantization(static_cast<int>(draco_tangent_id(mesh)), kTangentBits);
+    }
     const auto give_up = [](const std::string& what) {
         throw Error(Fault::numeric, "encode_draco: " + what +
                                         "; give a closed 2-manifold whose vertices are all used");
@@ -300,8 +440,11 @@ EncodedLevel encode_draco(const TriMesh& mesh, const PositionGrid& grid,
     level.decoded = std::move(decoded.mesh);
     const std::size_t n_points = level.decoded.positions.size();
     const std::size_t n_faces = level.decoded.triangles.size();
-    if (n_points != mesh.positions.size() || n_faces != mesh.triangles.size() ||
-        n_points != encoder.num_encoded_points() || n_faces != encoder.num_encoded_faces())
+    // Where a chart touches itself in a vertex, Draco makes two points of it.
+    const bool lost =
+        textured ? n_points < mesh.positions.size() : n_points != mesh.positions.size();
+    if (lost || n_faces != mesh.triangles.size() || n_points != encoder.num_encoded_points() ||
+        n_faces != encoder.num_encoded_faces())
         give_up(std::to_string(mesh.positions.size()) + " points and " +
                 std::to_string(mesh.triangles.size()) + " faces came back as " +
                 std::to_string(n_points) + " and " + std::to_string(n_faces));
@@ -314,6 +457,24 @@ EncodedLevel encode_draco(const TriMesh& mesh, const PositionGrid& grid,
         give_up("Draco numbered the attributes in another way");
     if (sorted_faces(level.decoded) != sorted_faces(mesh))
         give_up("a face came back with other positions");
+    return level;
+}
+
+} // namespace
+
+EncodedLevel encode_draco(const TriMesh& mesh, const PositionGrid& grid,
+                          const std::string& recipe) {
+    return encode(mesh, nullptr, grid, recipe);
+}
+
+EncodedLevel encode_draco(const TexturedMesh& textured, const PositionGrid& grid) {
+    EncodedLevel level = encode(textured.mesh, &textured, grid, {});
+    TexturedMesh decoded = decode_textured_draco(level.draco, "encode_draco");
+    if (sorted_faces(decoded) != sorted_faces(textured))
+        throw Error(Fault::numeric, "encode_draco: a face came back with other texture points; "
+                                    "give a closed 2-manifold whose vertices are all used");
+    level.texture = std::move(decoded.texture);
+    level.tangents = std::move(decoded.tangents);
     return level;
 }
 

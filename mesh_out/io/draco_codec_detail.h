@@ -5,6 +5,7 @@
 #include <string_view>
 #include <vector>
 
+#include "mesh_out/textured_mesh.h"
 #include "stats/core/tri_mesh.h"
 
 namespace taihu {
@@ -14,6 +15,12 @@ inline constexpr std::uint32_t kDracoPositionId = 0, kDracoNormalId = 1;
 /// They are numbered without a gap.
 inline std::uint32_t draco_colour_id(const TriMesh& mesh) {
     return mesh.normals.empty() ? 1 : 2;
+}
+inline std::uint32_t draco_texture_id(const TriMesh& mesh) {
+    return draco_colour_id(mesh) + (mesh.openness.empty() ? 0 : 1);
+}
+inline std::uint32_t draco_tangent_id(const TriMesh& mesh) {
+    return draco_texture_id(mesh) + 1;
 }
 
 /// A decoded mesh with the attribute ids that glTF refers to.
@@ -27,5 +34,8 @@ struct DracoMesh {
 
 /// decode_draco() and the ids.
 DracoMesh decode_draco_mesh(std::string_view bytes, const std::string& where);
+
+/// What encode_draco() made of a textured mesh.
+TexturedMesh decode_textured_draco(std::string_view bytes, const std::string& where);
 
 } // namespace taihu

@@ -13,6 +13,7 @@
 #include <ImfInputFile.h>
 #include <ImfOutputFile.h>
 #include <ImfStringAttribute.h>
+#include <half.h>
 
 #include "stats/core/error.h"
 #include "stats/core/file.h"
@@ -160,19 +161,34 @@ std::vector<std::string> chosen(const Imf::ChannelList& list, std::span<const st
     return out;
 }
 
-Imf::FrameBuffer frame_of(Image& image, std::span<const std::string> channels, Imath::V2i origin) {
-    const std::size_t pixel = sizeof(float) * static_cast<std::size_t>(image.channels);
-    const std::size_t row = pixel * static_cast<std::size_t>(image.width);
+/// \param pixels  as those of an image of this width, each sample a Sample.
+template <class Sample>
+Imf::FrameBuffer frame_of(std::vector<Sample>& pixels, int width,
+                          std::span<const std::string> channels, Imath::V2i origin) {
+    const std::size_t pixel = sizeof(Sample) * channels.size();
+    const std::size_t row = pixel * static_cast<std::size_t>(width);
     // OpenEXR adds the coordinates of a pixel to the base: in integers, for it may point nowhere.
-    const auto base = reinterpret_cast<std::uintptr_t>(image.pixels.data()) -
+    const auto base = reinterpret_cast<std::uintptr_t>(pixels.data()) -
                       static_cast<std::uintptr_t>(static_cast<std::intptr_t>(origin.x)) * pixel -
                       static_cast<std::uintptr_t>(static_cast<std::intptr_t>(origin.y)) * row;
     Imf::FrameBuffer frame;
     for (std::size_t c = 0; c < channels.size(); ++c)
-        frame.insert(
-            channels[c],
-            Imf::Slice(Imf::FLOAT, reinterpret_cast<char*>(base + c * sizeof(float)), pixel, row));
+        frame.insert(channels[c],
+                     Imf::Slice(std::is_same_v<Sample, half> ? Imf::HALF : Imf::FLOAT,
+                                reinterpret_cast<char*>(base + c * sizeof(Sample)), pixel, row));
     return frame;
+}
+
+std::vector<half> to_halves(const Image& image, const std::string& name) {
+    std::vector<half> out;
+    out.reserve(image.pixels.size());
+    for (const float value : image.pixels) {
+        out.emplace_back(value);
+        if (!out.back().isFinite())
+            throw Error(Fault::bad_argument, name + ": " + std::to_string(value) +
+                                                 " is beyond what a half holds; write it as float");
+    }
+    return out;
 }
 
 /// The size that a header gives, once it is one that the file can hold.
@@ -199,7 +215,7 @@ Image empty_image(const Imf::Header& header, std::size_t n_channels, std::size_t
 
 } // namespace
 
-void write_exr(const std::filesystem::path& path, const ExrImage& exr) {
+void write_exr(const std::filesystem::path& path, const ExrImage& exr, ExrSamples samples) {
     const Image& image = exr.image;
     std::vector<std::string> sorted = exr.channels;
     std::sort(sorted.begin(), sorted.end());
@@ -221,10 +237,20 @@ void write_exr(const std::filesystem::path& path, const ExrImage& exr) {
         for (const auto& [key, value] : exr.attributes)
             header.insert(key, Imf::StringAttribute(value));
         for (const std::string& name : exr.channels)
-            header.channels().insert(name, Imf::Channel(Imf::FLOAT));
+            header.channels().insert(
+                name, Imf::Channel(samples == ExrSamples::half ? Imf::HALF : Imf::FLOAT));
         Imf::OutputFile file(stream, header);
-        file.setFrameBuffer(frame_of(const_cast<Image&>(image), exr.channels, {0, 0})); // it reads
-        file.writePixels(image.height);
+        if (samples == ExrSamples::half) {
+            std::vector<half> halves = to_halves(image, base_name(path));
+            file.setFrameBuffer(frame_of(halves, image.width, exr.channels, {0, 0}));
+            file.writePixels(image.height);
+        } else {
+            auto& pixels = const_cast<std::vector<float>&>(image.pixels); // it reads
+            file.setFrameBuffer(frame_of(pixels, image.width, exr.channels, {0, 0}));
+            file.writePixels(image.height);
+        }
+    } catch (const Error&) {
+        throw;
     } catch (const std::exception& e) {
         throw Error(Fault::bad_argument, base_name(path) + ": OpenEXR refuses: " + e.what());
     }
@@ -249,7 +275,7 @@ ExrImage read_exr(const std::filesystem::path& path, std::span<const std::string
             if (const auto* text = dynamic_cast<const Imf::StringAttribute*>(&it.attribute()))
                 out.attributes.emplace_back(it.name(), text->value());
         const Imath::Box2i window = header.dataWindow();
-        file.setFrameBuffer(frame_of(out.image, out.channels, window.min));
+        file.setFrameBuffer(frame_of(out.image.pixels, out.image.width, out.channels, window.min));
         file.readPixels(window.min.y, window.max.y);
         return out;
     } catch (const Error&) {

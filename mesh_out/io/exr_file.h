@@ -16,11 +16,17 @@ struct ExrImage {
     std::vector<std::pair<std::string, std::string>> attributes; ///< those that are text
 };
 
-/// Write a scanline EXR: 32-bit float, ZIP compression, lossless. In one step, like write_file();
-/// the same image gives the same bytes.
-/// \throws Error bad_argument: not as many different names as channels, or what OpenEXR refuses;
-///         io.
-void write_exr(const std::filesystem::path& path, const ExrImage& exr);
+enum class ExrSamples {
+    full, ///< 32 bits, lossless
+    half  ///< 16 bits: 11 significant ones, magnitudes from 6e-8 to 65504
+};
+
+/// Write a scanline EXR, ZIP compression. In one step, like write_file(); the same image gives the
+/// same bytes.
+/// \throws Error bad_argument: not as many different names as channels, a number that a half
+///         cannot hold, or what OpenEXR refuses; io.
+void write_exr(const std::filesystem::path& path, const ExrImage& exr,
+               ExrSamples samples = ExrSamples::full);
 
 /// An EXR of one part, scanlines or tiles, half, float or integer samples.
 ///

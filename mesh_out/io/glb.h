@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "mesh_out/position_grid.h"
+#include "mesh_out/textured_mesh.h"
 #include "stats/core/tri_mesh.h"
 
 namespace taihu {
@@ -15,6 +16,10 @@ struct EncodedLevel {
     TriMesh decoded;   ///< what decoding those bytes gives
     double screen_coverage =
         0; ///< MSFT_screencoverage: share of the screen down to which it is used
+    // With a texture, one of these per position of `decoded`; else empty.
+    std::vector<TexturePoint> texture;
+    std::vector<Vec3> tangents;
+    std::string normal_png, occlusion_png, colour_png; ///< its images, or empty
 };
 
 /// Compress with Draco's ExpertEncoder: edgebreaker, positions on `grid` without loss, normals
@@ -25,6 +30,12 @@ struct EncodedLevel {
 ///   one of the mesh's; bad_argument when a position is not on the grid.
 EncodedLevel encode_draco(const TriMesh& mesh, const PositionGrid& grid,
                           const std::string& recipe = {});
+
+/// The same with texture points, without loss, and tangents in 8 bits. What is decoded is cut where
+/// the texture has seams, and the connectivity of what is coded is not.
+/// \throws as encode_draco(); bad_argument: texture points that lie on no grid of 18 bits in 0..1,
+/// or as many others as positions.
+EncodedLevel encode_draco(const TexturedMesh& textured, const PositionGrid& grid);
 
 /// \param where  stands for the file's name in messages.
 /// \throws Error bad_input: not a Draco mesh, cut short, no positions, an index past the last
@@ -41,9 +52,10 @@ struct GlbSettings {
 };
 
 /// A GLB of Draco levels, finest first: KHR_draco_mesh_compression (required), openness as COLOR_0,
-/// which viewers multiply the base colour with, and with more than one level MSFT_lod on the first
-/// node and MSFT_screencoverage in its extras. Accessor counts, minima and maxima are those of the
-/// decoded arrays. The same input gives the same bytes.
+/// which viewers multiply the base colour with, texture points as TEXCOORD_0, tangents as TANGENT
+/// and the images as normalTexture, occlusionTexture and baseColorTexture of a material of the level's own, and with
+/// more than one level MSFT_lod on the first node and MSFT_screencoverage in its extras. Accessor
+/// counts, minima and maxima are those of the decoded arrays. The same input gives the same bytes.
 std::string format_glb(std::span<const EncodedLevel> levels, const GlbSettings& settings = {});
 
 /// What brings the middle of the foot of a box to the origin, within 1/4096 of its longest side.

@@ -1,5 +1,6 @@
 #include <cmath>
 #include <limits>
+#include <optional>
 
 #include <nlohmann/json.hpp>
 
@@ -60,7 +61,10 @@ struct Assembly {
 
     /// What a viewer needs to know of an array, wherever its data are.
     static Json describe_vectors(const std::vector<Vec3>& vectors) {
-        return {{"componentType", kGltfFloat}, {"count", vectors.size()}, {"type", "VEC3"}};
+        return describe_floats("VEC3", vectors.size());
+    }
+    static Json describe_floats(const char* type, std::size_t count) {
+        return {{"componentType", kGltfFloat}, {"count", count}, {"type", type}};
     }
     static Json describe_colours(const std::vector<float>& openness) {
         return {{"componentType", kGltfUbyte},
@@ -113,12 +117,51 @@ std::string float_bytes(const std::vector<Vec3>& vectors) {
     return out;
 }
 
-Json draco_primitive(Assembly& glb, const EncodedLevel& level) {
+/// An index for `texture` of a material.
+Json add_texture(Assembly& glb, const std::string& png) {
+    if (!glb.json.contains("samplers")) // linear, with mipmaps, clamped
+        glb.json["samplers"] = Json::array(
+            {{{"magFilter", 9729}, {"minFilter", 9987}, {"wrapS", 33071}, {"wrapT", 33071}}});
+    glb.json["images"].push_back({{"bufferView", glb.add_view(png)}, {"mimeType", "image/png"}});
+    const std::size_t source = glb.json["images"].size() - 1;
+    glb.json["textures"].push_back({{"sampler", 0}, {"source", source}});
+    return {{"index", glb.json["textures"].size() - 1}};
+}
+
+bool has_images(const EncodedLevel& level) {
+    return !level.normal_png.empty() || !level.occlusion_png.empty() || !level.colour_png.empty();
+}
+
+/// Of levels without images, one for all; of others, one each. Returns its index.
+std::size_t add_material(Assembly& glb, const EncodedLevel& level, const GlbSettings& settings,
+                         std::optional<std::size_t>& plain) {
+    const bool is_plain = !has_images(level);
+    if (is_plain && plain)
+        return *plain;
+    Json material = {{"pbrMetallicRoughness",
+                      {{"baseColorFactor", {settings.grey, settings.grey, settings.grey, 1.0}},
+                       {"metallicFactor", 0.0},
+                       {"roughnessFactor", settings.roughness}}},
+                     {"doubleSided", false}};
+    if (!level.normal_png.empty())
+        material["normalTexture"] = add_texture(glb, level.normal_png);
+    if (!level.occlusion_png.empty())
+        material["occlusionTexture"] = add_texture(glb, level.occlusion_png);
+    if (!level.colour_png.empty())
+        material["pbrMetallicRoughness"]["baseColorTexture"] = add_texture(glb, level.colour_png);
+    glb.json["materials"].push_back(std::move(material));
+    const std::size_t index = glb.json["materials"].size() - 1;
+    if (is_plain)
+        plain = index;
+    return index;
+}
+
+Json draco_primitive(Assembly& glb, const EncodedLevel& level, std::size_t material) {
     const TriMesh& mesh = level.decoded;
     const std::size_t view = glb.add_view(level.draco);
     Json attributes = {{"POSITION", kDracoPositionId}};
     Json primitive = {
-        {"material", 0},
+        {"material", material},
         {"mode", 4},
         {"indices", glb.add_accessor(Assembly::describe_indices(mesh.triangles))},
         {"attributes",
@@ -132,6 +175,14 @@ Json draco_primitive(Assembly& glb, const EncodedLevel& level) {
         attributes["COLOR_0"] = draco_colour_id(mesh);
         primitive["attributes"]["COLOR_0"] =
             glb.add_accessor(Assembly::describe_colours(mesh.openness));
+    }
+    if (!level.texture.empty()) {
+        attributes["TEXCOORD_0"] = draco_texture_id(mesh);
+        attributes["TANGENT"] = draco_tangent_id(mesh);
+        primitive["attributes"]["TEXCOORD_0"] =
+            glb.add_accessor(Assembly::describe_floats("VEC2", level.texture.size()));
+        primitive["attributes"]["TANGENT"] =
+            glb.add_accessor(Assembly::describe_floats("VEC4", level.tangents.size()));
     }
     primitive["extensions"]["KHR_draco_mesh_compression"] = {{"bufferView", view},
                                                              {"attributes", attributes}};
@@ -147,6 +198,11 @@ void check_levels(std::span<const EncodedLevel> levels, const GlbSettings& setti
     for (std::size_t i = 0; i < levels.size(); ++i)
         if (levels[i].draco.empty() || levels[i].decoded.triangles.empty())
             fail("levels[" + std::to_string(i) + "] is empty", "make it by encode_draco()");
+    for (std::size_t i = 0; i < levels.size(); ++i)
+        if (levels[i].texture.size() != levels[i].tangents.size() ||
+            (levels[i].texture.empty() && has_images(levels[i])))
+            fail("levels[" + std::to_string(i) + "] has images without texture points",
+                 "encode it with its texture");
     if (!(settings.roughness >= 0 && settings.roughness <= 1))
         fail("roughness is " + std::to_string(settings.roughness), "give 0 to 1");
     if (!(settings.grey >= 0 && settings.grey <= 1))
@@ -199,18 +255,15 @@ std::string format_glb(std::span<const EncodedLevel> levels, const GlbSettings& 
     Assembly glb(settings.recipe);
     glb.json["extensionsUsed"] = {"KHR_draco_mesh_compression"};
     glb.json["extensionsRequired"] = {"KHR_draco_mesh_compression"};
-    glb.json["materials"].push_back(
-        {{"pbrMetallicRoughness",
-          {{"baseColorFactor", {settings.grey, settings.grey, settings.grey, 1.0}},
-           {"metallicFactor", 0.0},
-           {"roughnessFactor", settings.roughness}}},
-         {"doubleSided", false}});
+    std::optional<std::size_t> plain;
     Json lower = Json::array(), coverages = Json::array();
     for (std::size_t i = 0; i < levels.size(); ++i) {
         const std::string name =
             i == 0 ? settings.name : settings.name + "_lod" + std::to_string(i);
+        const std::size_t material = add_material(glb, levels[i], settings, plain);
         glb.json["meshes"].push_back(
-            {{"name", name}, {"primitives", Json::array({draco_primitive(glb, levels[i])})}});
+            {{"name", name},
+             {"primitives", Json::array({draco_primitive(glb, levels[i], material)})}});
         Json node = {{"name", name}, {"mesh", i}};
         if (const Vec3& s = settings.shift; s != Vec3{})
             node["translation"] = {s.x, s.y, s.z};

@@ -94,7 +94,8 @@ struct PngReader : PngState {
     }
 };
 
-bool write_png(PngWriter& w, const Image& image, png_bytep* rows, png_textp texts, int n_texts) {
+bool write_png(PngWriter& w, const Image& image, PngValues values, png_bytep* rows, png_textp texts,
+               int n_texts) {
     if (!w.info || setjmp(png_jmpbuf(w.png)))
         return false;
     png_set_write_fn(w.png, &w, PngWriter::append, PngWriter::flush);
@@ -104,7 +105,8 @@ bool write_png(PngWriter& w, const Image& image, png_bytep* rows, png_textp text
     png_set_IHDR(w.png, w.info, static_cast<png_uint_32>(image.width),
                  static_cast<png_uint_32>(image.height), 8, type, PNG_INTERLACE_NONE,
                  PNG_COMPRESSION_TYPE_DEFAULT, PNG_FILTER_TYPE_DEFAULT);
-    png_set_sRGB(w.png, w.info, PNG_sRGB_INTENT_PERCEPTUAL);
+    if (values == PngValues::light)
+        png_set_sRGB(w.png, w.info, PNG_sRGB_INTENT_PERCEPTUAL);
     if (n_texts > 0)
         png_set_text(w.png, w.info, texts, n_texts);
     png_write_info(w.png, w.info);
@@ -115,14 +117,31 @@ bool write_png(PngWriter& w, const Image& image, png_bytep* rows, png_textp text
 
 using Attributes = std::vector<std::pair<std::string, std::string>>;
 
-std::string png_bytes(const std::filesystem::path& path, const Image& image,
+void check_image(const std::string& where, const Image& image) {
+    if (image.channels != 1 && image.channels != 3 && image.channels != 4)
+        throw Error(Fault::bad_argument, where + ": the image has " +
+                                             std::to_string(image.channels) +
+                                             " channels; give 1, 3 or 4");
+    if (image.width <= 0 || image.height <= 0 ||
+        image.pixels.size() / static_cast<std::size_t>(image.channels) /
+                static_cast<std::size_t>(image.width) !=
+            static_cast<std::size_t>(image.height) ||
+        image.pixels.size() % static_cast<std::size_t>(image.channels * image.width) != 0)
+        throw Error(Fault::bad_argument,
+                    where + ": " + std::to_string(image.pixels.size()) +
+                        " numbers are no image of " + std::to_string(image.width) + " x " +
+                        std::to_string(image.height) + " pixels; give width * height * channels");
+}
+
+std::string png_bytes(const std::string& where, const Image& image, PngValues values,
                       const Attributes& attributes) {
     std::vector<png_byte> samples(image.pixels.size());
     for (std::size_t i = 0; i < samples.size(); ++i) {
         const auto channel = static_cast<int>(i % static_cast<std::size_t>(image.channels));
         const bool is_alpha = has_alpha(image.channels) && channel == image.channels - 1;
         const double value = image.pixels[i] > 0 ? std::min(1.0, double{image.pixels[i]}) : 0;
-        samples[i] = static_cast<png_byte>(255 * (is_alpha ? value : encoded(value)) + 0.5);
+        const bool is_stored = is_alpha || values == PngValues::data;
+        samples[i] = static_cast<png_byte>(255 * (is_stored ? value : encoded(value)) + 0.5);
     }
     std::vector<png_bytep> rows;
     const std::size_t row_bytes = samples.size() / static_cast<std::size_t>(image.height);
@@ -132,7 +151,7 @@ std::string png_bytes(const std::filesystem::path& path, const Image& image,
     for (const auto& [key, value] : attributes) {
         if (key.empty() || key.size() > 79)
             throw Error(Fault::bad_argument,
-                        base_name(path) + ": attribute '" + key +
+                        where + ": attribute '" + key +
                             "': a PNG takes names of 1 to 79 characters; rename it");
         png_text text{};
         text.compression = PNG_TEXT_COMPRESSION_NONE;
@@ -142,8 +161,9 @@ std::string png_bytes(const std::filesystem::path& path, const Image& image,
         texts.push_back(text);
     }
     PngWriter writer;
-    if (!write_png(writer, image, rows.data(), texts.data(), static_cast<int>(texts.size())))
-        throw Error(Fault::io, base_name(path) + ": cannot encode: " + writer.message.data());
+    if (!write_png(writer, image, values, rows.data(), texts.data(),
+                   static_cast<int>(texts.size())))
+        throw Error(Fault::io, where + ": cannot encode: " + writer.message.data());
     return std::move(writer.bytes);
 }
 
@@ -192,7 +212,7 @@ bool read_rows(PngReader& r, png_bytep* rows) {
     return true;
 }
 
-Image linear_image(const PngShape& shape, const std::vector<png_byte>& samples) {
+Image image_of(const PngShape& shape, const std::vector<png_byte>& samples, PngValues values) {
     Image image(static_cast<int>(shape.width), static_cast<int>(shape.height),
                 static_cast<int>(shape.channels));
     const std::size_t n_levels = shape.bytes_per_sample == 2 ? 65536 : 256;
@@ -207,12 +227,18 @@ Image linear_image(const PngShape& shape, const std::vector<png_byte>& samples) 
         const std::size_t level =
             shape.bytes_per_sample == 2 ? samples[2 * i] * 256u + samples[2 * i + 1] : samples[i];
         const bool is_alpha = has_alpha(image.channels) && (i + 1) % shape.channels == 0;
-        image.pixels[i] = (is_alpha ? straight : curve)[level];
+        image.pixels[i] = (is_alpha || values == PngValues::data ? straight : curve)[level];
     }
     return image;
 }
 
 } // namespace
+
+std::string format_png(const Image& image, PngValues values, const std::string& where,
+                       const std::vector<std::pair<std::string, std::string>>& attributes) {
+    check_image(where, image);
+    return png_bytes(where, image, values, attributes);
+}
 
 void write_image(const std::filesystem::path& path, const Image& image,
                  const std::vector<std::pair<std::string, std::string>>& attributes) {
@@ -221,21 +247,9 @@ void write_image(const std::filesystem::path& path, const Image& image,
         throw Error(Fault::unsupported, base_name(path) +
                                             ": images are written as .png or .exr, not '" +
                                             extension + "'; choose one of these");
-    if (image.channels != 1 && image.channels != 3 && image.channels != 4)
-        throw Error(Fault::bad_argument, base_name(path) + ": the image has " +
-                                             std::to_string(image.channels) +
-                                             " channels; give 1, 3 or 4");
-    if (image.width <= 0 || image.height <= 0 ||
-        image.pixels.size() / static_cast<std::size_t>(image.channels) /
-                static_cast<std::size_t>(image.width) !=
-            static_cast<std::size_t>(image.height) ||
-        image.pixels.size() % static_cast<std::size_t>(image.channels * image.width) != 0)
-        throw Error(Fault::bad_argument,
-                    base_name(path) + ": " + std::to_string(image.pixels.size()) +
-                        " numbers are no image of " + std::to_string(image.width) + " x " +
-                        std::to_string(image.height) + " pixels; give width * height * channels");
     if (extension == ".png")
-        return write_file(path, png_bytes(path, image, attributes));
+        return write_file(path, format_png(image, PngValues::light, base_name(path), attributes));
+    check_image(base_name(path), image);
     std::vector<std::string> channels = {"Y"};
     if (image.channels > 1)
         channels.assign({"R", "G", "B", "A"});
@@ -243,7 +257,7 @@ void write_image(const std::filesystem::path& path, const Image& image,
     write_exr(path, {image, channels, attributes});
 }
 
-Image read_png(const std::filesystem::path& path) {
+Image read_png(const std::filesystem::path& path, PngValues values) {
     const std::string bytes = read_file(path);
     const auto refuse = [&](const std::string& what, const char* remedy) -> Error {
         return Error(Fault::bad_input, base_name(path) + ": " + what + "; " + remedy);
@@ -271,7 +285,7 @@ Image read_png(const std::filesystem::path& path) {
         rows[y] = samples.data() + y * shape.row_bytes;
     if (!read_rows(reader, rows.data()))
         throw damaged();
-    return linear_image(shape, samples);
+    return image_of(shape, samples, values);
 }
 
 } // namespace taihu

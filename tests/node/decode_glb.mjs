@@ -4,7 +4,7 @@
 import fs from 'node:fs';
 import { load } from './modules.mjs';
 
-const kComponents = { SCALAR: 1, VEC3: 3, VEC4: 4 };
+const kComponents = { SCALAR: 1, VEC2: 2, VEC3: 3, VEC4: 4 };
 const kByte = 5121, kFloat = 5126;
 
 function check(condition, message) {

@@ -2,26 +2,13 @@
 // and judges the pixels: the finest level alone is shown, with the decoded number of triangles, in
 // the middle, shaded, and with the outline that its own vertices have.
 import fs from 'node:fs';
-import http from 'node:http';
-import os from 'node:os';
-import path from 'node:path';
-import { load, modulesFolder } from './modules.mjs';
+import { show } from './browser.mjs';
 
 const kSize = 256;
-const kTypes = { '.js': 'text/javascript', '.wasm': 'application/wasm', '.glb': 'model/gltf-binary' };
-const kFlags = ['--no-sandbox', '--disable-gpu', '--enable-unsafe-swiftshader', '--no-first-run'];
 
 /** Runs in the page. Parallel light from the eye, so that shading tells slopes apart. */
-const kPage = `<!doctype html><meta charset="utf-8"><body>
-<script type="importmap">{"imports":{"three":"/modules/three/build/three.module.js",
-"three/addons/":"/modules/three/examples/jsm/"}}</script>
-<script type="module">
-import * as THREE from 'three';
-import { GLTFLoader } from 'three/addons/loaders/GLTFLoader.js';
-import { DRACOLoader } from 'three/addons/loaders/DRACOLoader.js';
-try {
-  const draco = new DRACOLoader().setDecoderPath('/modules/three/examples/jsm/libs/draco/gltf/');
-  const { scene } = await new GLTFLoader().setDRACOLoader(draco).loadAsync('/model.glb');
+const kScript = `
+  const scene = await loadGlb('/model.glb');
   const box = new THREE.Box3().setFromObject(scene);
   const middle = box.getCenter(new THREE.Vector3()), half = box.getSize(new THREE.Vector3()).length() / 2;
   const camera = new THREE.OrthographicCamera(-half, half, half, -half, 0, 4 * half);
@@ -47,57 +34,10 @@ try {
     for (let i = 0; i < p.count; ++i) points.push(p.getX(i) - middle.x, p.getY(i) - middle.y);
   });
   window.result = { meshes, half, points, pixels: Array.from(pixels) };
-} catch (error) {
-  window.result = { error: String(error) };
-}
-</script>`;
+`;
 
 function check(condition, message) {
   if (!condition) throw new Error(message);
-}
-
-function serve(model) {
-  const modules = modulesFolder();
-  return http.createServer((request, answer) => {
-    const url = new URL(request.url, 'http://localhost').pathname;
-    if (url === '/') {
-      answer.setHeader('content-type', 'text/html');
-      answer.end(kPage);
-      return;
-    }
-    const file = url === '/model.glb' ? model
-      : url.startsWith('/modules/') ? path.join(modules, url.slice('/modules/'.length)) : '';
-    if (!file || !fs.existsSync(file)) {
-      answer.statusCode = 404;
-      answer.end();
-      return;
-    }
-    answer.setHeader('content-type', kTypes[path.extname(file)] ?? 'application/octet-stream');
-    fs.createReadStream(file).pipe(answer);
-  });
-}
-
-async function show(model, picture) {
-  const { chromium } = load('playwright-core');
-  const server = serve(model);
-  await new Promise((done) => server.listen(0, '127.0.0.1', done));
-  const profile = fs.mkdtempSync(path.join(os.tmpdir(), 'taihu-chromium-'));
-  const browser = await chromium.launchPersistentContext(profile, {
-    executablePath: process.env.TAIHU_CHROMIUM ?? '/usr/bin/chromium',
-    headless: true,
-    args: kFlags,
-  });
-  try {
-    const page = await browser.newPage();
-    await page.goto(`http://127.0.0.1:${server.address().port}/`);
-    await page.waitForFunction('window.result', null, { timeout: 120000 });
-    if (picture) await page.locator('canvas').screenshot({ path: picture });
-    return await page.evaluate('window.result');
-  } finally {
-    await browser.close();
-    server.close();
-    fs.rmSync(profile, { recursive: true, force: true });
-  }
 }
 
 /** Triangles of the first mesh as its accessor states them; decode_glb.mjs checks that. */
@@ -148,7 +88,7 @@ if (!model) {
   process.exit(2);
 }
 try {
-  console.log(`${model}: ${judge(await show(model, picture), finestTriangles(model))}`);
+  console.log(`${model}: ${judge(await show(kScript, { '/model.glb': model }, picture), finestTriangles(model))}`);
 } catch (error) {
   console.error(`${model}: ${error.message}`);
   process.exit(1);

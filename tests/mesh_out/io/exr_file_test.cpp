@@ -64,6 +64,24 @@ TEST(ExrFile, ChannelsAreFoundByName) {
                  [&] { read_exr(folder / "a.exr", none); });
 }
 
+TEST(ExrFile, HalvesKeepElevenBitsAndRefuseWhatTheyCannotHold) {
+    const Scratch folder;
+    ExrImage tile = sample({"R", "G", "B"});
+    expect_error(Fault::bad_argument, "is beyond what a half holds; write it as float",
+                 [&] { write_exr(folder / "a.exr", tile, ExrSamples::half); });
+    EXPECT_FALSE(std::filesystem::exists(folder / "a.exr"));
+    tile.image.pixels[3] = 0;
+    write_exr(folder / "a.exr", tile, ExrSamples::half);
+    write_exr(folder / "b.exr", tile);
+    EXPECT_LT(std::filesystem::file_size(folder / "a.exr"),
+              0.7 * static_cast<double>(std::filesystem::file_size(folder / "b.exr")));
+    const std::vector<std::string> order = {"R", "G", "B"};
+    const ExrImage back = read_exr(folder / "a.exr", order);
+    EXPECT_EQ(back.attributes, tile.attributes);
+    for (std::size_t i = 0; i < tile.image.pixels.size(); ++i) // half a step below 1/2, and zero
+        ASSERT_NEAR(back.image.pixels[i], tile.image.pixels[i], std::ldexp(1, -13));
+}
+
 TEST(ExrFile, HalvesTilesAndShiftedWindowsAreRead) {
     const Scratch folder;
     std::vector<half> values(20 * 10);

@@ -67,6 +67,18 @@ TEST_P(PngChannels, ComeBackWithinAStepOfEightBits) {
 }
 INSTANTIATE_TEST_SUITE_P(PngImage, PngChannels, testing::Values(1, 3, 4));
 
+TEST(PngImage, DataIsStoredWithoutACurve) {
+    const Scratch folder;
+    const Image image = ramp(3);
+    write_file(folder / "a.png", format_png(image, PngValues::data, "a.png"));
+    const Image back = read_png(folder / "a.png", PngValues::data);
+    for (std::size_t i = 0; i < image.pixels.size(); ++i)
+        ASSERT_NEAR(back.pixels[i], image.pixels[i], 0.5001 / 255); // half a step of 8 bits
+    EXPECT_EQ(read_file(folder / "a.png").find("sRGB"), std::string::npos);
+    expect_error(Fault::bad_argument, "map: the image has 2 channels",
+                 [&] { format_png(ramp(2), PngValues::data, "map"); });
+}
+
 TEST(PngImage, CutsWhatDoesNotFit) {
     const Scratch folder;
     Image image(5, 1, 1);

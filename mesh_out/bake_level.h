@@ -1,0 +1,44 @@
+#pragma once
+#include <cstddef>
+#include <vector>
+
+#include "mesh_out/bake.h"
+#include "mesh_out/lod.h"
+
+namespace taihu {
+
+struct BakeLevelSettings {
+    double reach_m = 0; ///< cage, as in BakeSettings
+    int side_px = 2048; ///< of the maps, 64..8192,
+    double texel_m = 0; ///< halved while no texel is larger than this; 0: as it is
+    int gutter_px = 3;  ///< around each chart, 1..16
+    double grain_m = 0; ///< as in BakeSettings
+    double grain_contrast = 0.4;
+    bool occlusion = true; ///< an occlusion texture in the file
+    bool masters = true;   ///< all maps, else those of the file alone
+};
+
+/// A level with its texture, as the decoded file holds it.
+struct BakedLevel {
+    EncodedLevel encoded; ///< Draco bytes, texture points, tangents and images
+    BakedMaps maps;
+    RelitError relit;
+    std::size_t n_charts = 0;
+    double texel_m = 0, used_rel = 0, most_stretch = 0, stretched_area_rel = 0; ///< of ChartAtlas
+};
+
+/// Cut a level along the seams of a chart atlas, code it on its own grid, decode it, certify it
+/// again (closed once equal positions are welded) and bake what it lost onto what was decoded. It
+/// has no openness in its vertices: the occlusion texture says the same.
+/// \throws Error as chart_atlas(), encode_draco() and bake(); numeric: it would not hold its
+/// certificate.
+BakedLevel bake_level(const LodLevel& level, const BakeSource& fine,
+                      const BakeLevelSettings& settings, Progress* progress = nullptr);
+
+/// The fine surface of a solid, for all of its levels. \param field  what the solid was made of.
+/// \param n_rays  of the openness; 0: none is worked out, and all is open.
+/// \throws Error as extract() and BakeSource.
+BakeSource bake_source(const openvdb::FloatGrid& solid, const Field& field, double reach_m,
+                       int n_rays, Progress* progress = nullptr);
+
+} // namespace taihu
