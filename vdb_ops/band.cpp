@@ -96,9 +96,10 @@ FloatGrid::Ptr settled(const FloatGrid::Ptr& moved, float half_width_vox, Progre
     return redistance(*moved, half_width_vox, progress);
 }
 
-BandReader::BandReader(const FloatGrid& grid)
-    : accessor_(grid.getConstAccessor()), voxel_m_(grid.voxelSize().x()) {
-    const openvdb::Vec3d o = grid.indexToWorld(openvdb::Vec3d(0, 0, 0));
+BandReader::BandReader(FloatGrid::ConstPtr grid)
+    : grid_(std::move(grid)), accessor_(grid_->getConstAccessor()),
+      voxel_m_(grid_->voxelSize().x()) {
+    const openvdb::Vec3d o = grid_->indexToWorld(openvdb::Vec3d(0, 0, 0));
     origin_ = {o.x(), o.y(), o.z()};
 }
 

@@ -22,10 +22,10 @@ openvdb::FloatGrid::Ptr wide_band(const openvdb::FloatGrid& solid, double reach_
 openvdb::FloatGrid::Ptr settled(const openvdb::FloatGrid::Ptr& moved, float half_width_vox,
                                 Progress* progress);
 
-/// Reads a level set for one thread; the grid must outlive it.
+/// Reads a level set for one thread.
 class BandReader {
 public:
-    explicit BandReader(const openvdb::FloatGrid& grid);
+    explicit BandReader(openvdb::FloatGrid::ConstPtr grid);
 
     Vec3 place(const openvdb::Coord& c) const {
         return origin_ + Vec3{1. * c.x(), 1. * c.y(), 1. * c.z()} * voxel_m_;
@@ -40,6 +40,7 @@ public:
     Vec3 normal_at(const Vec3& p) const;
 
 private:
+    openvdb::FloatGrid::ConstPtr grid_;
     openvdb::FloatGrid::ConstAccessor accessor_;
     double voxel_m_;
     Vec3 origin_;

@@ -48,7 +48,8 @@ public:
     struct Start {
         Vec3 place, outwards;
     };
-    Starts(const FloatGrid& near, const Box& box, const BiteSettings& s, const Similarity& at)
+    Starts(const FloatGrid::ConstPtr& near, const Box& box, const BiteSettings& s,
+           const Similarity& at)
         : reader_(near), box_(box), s_(s), at_(at) {
         const double height = box.size().y;
         box_.lo.y = box.lo.y + s.bottom * height;
@@ -202,7 +203,7 @@ std::vector<Bite> place_bites(const FloatGrid& solid, const Box& box, const Bite
     check_bite_settings(s);
     const double scale = at.scale();
     const auto near = wide_band(solid, 0.5 * s.least_m * scale, "bites", progress);
-    const Starts starts(*near, box, s, at);
+    const Starts starts(near, box, s, at);
     const Rng rng{s.seed, kShapeStream};
     // An exponential law between its ends: by inversion.
     const double none = std::exp(-s.least_m / s.mean_m), all = std::exp(-s.most_m / s.mean_m);
@@ -269,7 +270,7 @@ FloatGrid::Ptr bitten(const FloatGrid& solid, std::span<const Bite> bites, Progr
     first.push_back(pairs.size());
     tbb::parallel_for(tbb::blocked_range<std::size_t>(0, leaves.size(), 8), [&](const auto& range) {
         check_cancelled(progress);
-        const BandReader reader(*wide);
+        const BandReader reader(wide);
         for (std::size_t l = range.begin(); l < range.end(); ++l)
             for (openvdb::Index i = 0; i < 512; ++i) {
                 const Vec3 p = reader.place(leaves[l]->offsetToGlobalCoord(i));

@@ -172,8 +172,8 @@ FloatGrid::Ptr roughen(const FloatGrid& solid, const RoughenSettings& s, const S
     const Similarity back = at.inverse();
     auto moved = wide->deepCopy();
     set_values(*moved, progress, [&] {
-        return [&, near = BandReader(*wide),
-                holes = BandReader(outside ? *outside : *wide)](const Coord& c, double d) {
+        return [&, near = BandReader(wide),
+                holes = BandReader(outside ? outside : wide)](const Coord& c, double d) {
             if (std::fabs(d) > reach + 1.8 * lattice.voxel_m) // a cell's diagonal: never reached
                 return d;
             const Vec3 normal = near.normal(c), foot = near.place(c) - normal * d;
@@ -217,7 +217,7 @@ FloatGrid::Ptr warp(const FloatGrid& solid, const WarpSettings& s, const Similar
     const Similarity back = at.inverse();
     auto moved = wide->deepCopy();
     set_values(*moved, progress, [&] {
-        return [&, reader = BandReader(*wide)](const Coord& c, double) {
+        return [&, reader = BandReader(wide)](const Coord& c, double) {
             const Vec3 p = reader.place(c), own = back.point(p);
             const Vec3 by{noise[0].at(own), noise[1].at(own), noise[2].at(own)};
             return reader.at(p + at.direction(by) * (s.amplitude_m * at.scale()));

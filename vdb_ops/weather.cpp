@@ -31,7 +31,7 @@ FloatGrid::Ptr step(const FloatGrid& solid, const WeatherSettings& s, const Frac
     auto moved = blurred(*wide, sigma_m, progress);
     const Similarity back = at.inverse();
     set_values(*moved, progress, [&] {
-        return [&, reader = BandReader(*wide)](const Coord& c, double blurred) {
+        return [&, reader = BandReader(wide)](const Coord& c, double blurred) {
             const double d = reader.value(c), curved = blurred - d;
             if (std::fabs(d) > 2 * sigma_m + 2 * solid.voxelSize().x())
                 return d; // a step moves no farther than sigma

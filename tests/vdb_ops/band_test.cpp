@@ -40,7 +40,7 @@ TEST(Band, SettledValuesAreALevelSetOnTheBandAskedFor) {
     const auto grown = settled(wide, 3, nullptr);
     EXPECT_NEAR(static_cast<double>(grown->background()), 3 * 0.05, 1e-6);
     // Twice the distance less 0.2 is 0 at a radius of 0.6; first order upwind, a tenth of a voxel.
-    const BandReader reader(*grown);
+    const BandReader reader(grown);
     for (const double r : {0.52, 0.6, 0.68})
         EXPECT_NEAR(reader.at({r, 0, 0}), r - 0.6, 0.005) << r;
     EXPECT_NEAR(reader.normal_at({0.6, 0, 0}).x, 1, 1e-3);

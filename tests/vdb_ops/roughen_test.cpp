@@ -46,7 +46,7 @@ double height_at(const BandReader& reader, double x, double z, double top, doubl
     return -top;
 }
 
-Image heights(const openvdb::FloatGrid& solid, int n, double voxel, double top) {
+Image heights(const openvdb::FloatGrid::Ptr& solid, int n, double voxel, double top) {
     const BandReader reader(solid);
     Image image(n, n, 1);
     for (int i = 0; i < n; ++i)
@@ -62,7 +62,7 @@ TEST(Roughen, SeedRowD20SolidNoiseGivesTheSurfaceItsHurstExponent) {
     const auto base = slab(1.7, 0.2, kVoxel);
     for (const double hurst : {0.6, 0.9}) {
         const auto rough = roughen(*base, fractal(0.015, 0.64, 0.02, hurst));
-        const auto tile = heights(*rough, kPixels, kVoxel, 0.09);
+        const auto tile = heights(rough, kPixels, kVoxel, 0.09);
         // 0.1 is the bar; distances are first order, which costs the finest waves a little.
         EXPECT_NEAR(fit_roughness(tile, kVoxel).hurst.value, hurst, 0.1);
         double sum = 0, squares = 0;
@@ -93,7 +93,7 @@ TEST(Roughen, IsTheSameRockOnAnotherLattice) {
     const RoughenSettings s = fractal(0.02, 0.4, 0.1, 0.8);
     const auto fine = roughen(*ball_grid(0.5, 0.0125), s),
                coarse = roughen(*ball_grid(0.5, 0.025), s);
-    const BandReader a(*fine), b(*coarse);
+    const BandReader a(fine), b(coarse);
     double worst = 0;
     for (std::uint64_t i = 0; i < 2000; ++i) {
         const Vec3 p = normalized(random_vec(i)) * 0.5;
@@ -116,7 +116,7 @@ TEST(Roughen, MovesWithTheSolidThatIsPutElsewhere) {
     const Similarity at = Similarity::translation({3, 1, 2}) * Similarity::scaling(2);
     const auto put =
         rasterize(SolidsField(std::vector<AnalyticSolid>{{BallSolid{0.5}, at}}), {0.05, {}, 3});
-    const BandReader here(*roughen(*ball_grid(0.5, 0.025), s)), there(*roughen(*put, s, at));
+    const BandReader here(roughen(*ball_grid(0.5, 0.025), s)), there(roughen(*put, s, at));
     for (std::uint64_t i = 0; i < 500; ++i) {
         const Vec3 p = normalized(random_vec(i)) * 0.5;
         if (const double d = here.at(p); std::fabs(d) < 0.04) {
@@ -127,7 +127,7 @@ TEST(Roughen, MovesWithTheSolidThatIsPutElsewhere) {
 
 /// Root mean square of distances of a rough ball's surface to the ball, of those directions.
 template <class Where>
-double rms(const openvdb::FloatGrid& rough, Where&& where) {
+double rms(const openvdb::FloatGrid::Ptr& rough, Where&& where) {
     const BandReader reader(rough);
     double sum = 0;
     int n = 0;
@@ -143,9 +143,9 @@ TEST(Roughen, IsAsRoughAsTheShareOfWhereItFaces) {
     RoughenSettings s = fractal(0.012, 0.1, 0.1, 0.8);
     s.facing = {1, 0.5, 0};
     const auto rough = roughen(*ball_grid(0.5, 0.0125), s);
-    const double up = rms(*rough, [](const Vec3&u) { return u.y > 0.8; }),
-                 side = rms(*rough, [](const Vec3&u) { return std::fabs(u.y) < 0.2; }),
-                 down = rms(*rough, [](const Vec3&u) { return u.y < -0.9; });
+    const double up = rms(rough, [](const Vec3&u) { return u.y > 0.8; }),
+                 side = rms(rough, [](const Vec3&u) { return std::fabs(u.y) < 0.2; }),
+                 down = rms(rough, [](const Vec3&u) { return u.y < -0.9; });
     EXPECT_NEAR(up, 0.95 * 0.012, 0.003); // few waves; slopes make distances smaller
     EXPECT_NEAR(side / up, 0.53, 0.15);
     EXPECT_LT(down, 0.15 * up);
@@ -153,7 +153,7 @@ TEST(Roughen, IsAsRoughAsTheShareOfWhereItFaces) {
 
 TEST(Roughen, IsFinerWhereTheHurstExponentIsLower) {
     RoughenSettings s = fractal(0.01, 0.4, 0.05, 0.4);
-    const auto curvature = [](const openvdb::FloatGrid& g, double sign) { // of distances, in y
+    const auto curvature = [](const openvdb::FloatGrid::Ptr& g, double sign) { // of distances, in y
         const BandReader reader(g);
         double sum = 0;
         for (std::uint64_t i = 0; i < 4000; ++i) {
@@ -167,7 +167,7 @@ TEST(Roughen, IsFinerWhereTheHurstExponentIsLower) {
     };
     s.hurst_down = 1.2;
     const auto rough = roughen(*ball_grid(0.5, 0.0125), s);
-    EXPECT_GT(curvature(*rough, 1), 1.3 * curvature(*rough, -1));
+    EXPECT_GT(curvature(rough, 1), 1.3 * curvature(rough, -1));
 }
 
 TEST(Roughen, SparesTheInsideOfHoles) {
@@ -175,7 +175,7 @@ TEST(Roughen, SparesTheInsideOfHoles) {
     const auto holed = holed_ball_grid(0.5, 0.0125, std::span(&hole, 1));
     RoughenSettings s = fractal(0.01, 0.1, 0.1, 0.8);
     s.inside = InsideShare{0.25, 0};
-    const BandReader reader(*roughen(*holed, s));
+    const BandReader reader(roughen(*holed, s));
     double in = 0, out = 0;
     for (std::uint64_t i = 0; i < 2000; ++i) {
         Vec3 u = normalized(random_vec(i));
@@ -191,8 +191,8 @@ TEST(Roughen, IsTamerTowardsTheTopWhenItsSharesSaySo) {
     RoughenSettings s = fractal(0.012, 0.1, 0.1, 0.8);
     s.height = HeightShares{-0.3, 0.3, 1, 0};
     const auto rough = roughen(*ball_grid(0.5, 0.0125), s);
-    EXPECT_LT(rms(*rough, [](const Vec3& u) { return u.y > 0.65; }), 0.001); // a tenth of a voxel
-    EXPECT_GT(rms(*rough, [](const Vec3& u) { return u.y < -0.65; }), 0.009);
+    EXPECT_LT(rms(rough, [](const Vec3& u) { return u.y > 0.65; }), 0.001); // a tenth of a voxel
+    EXPECT_GT(rms(rough, [](const Vec3& u) { return u.y < -0.65; }), 0.009);
 }
 
 TEST(Roughen, OneSidedItOnlyRemoves) {
@@ -203,7 +203,7 @@ TEST(Roughen, OneSidedItOnlyRemoves) {
     furrows.relief = Relief::furrows;
     furrows.removes = false;
     for (const auto& settings : {s, furrows}) {
-        const BandReader reader(*roughen(*ball, settings));
+        const BandReader reader(roughen(*ball, settings));
         double least = 1, most = -1;
         for (std::uint64_t i = 0; i < 2000; ++i) {
             const double d = reader.at(normalized(random_vec(i)) * 0.5);
@@ -219,7 +219,7 @@ TEST(Roughen, FurrowsRunAlongTheStretch) {
     RoughenSettings s = fractal(0.03, 0.1, 0.1, 0.8);
     s.relief = Relief::furrows;
     s.noise.stretch = 5;
-    const BandReader reader(*roughen(*slab(1, 1.2, 0.02), s));
+    const BandReader reader(roughen(*slab(1, 1.2, 0.02), s));
     double along = 0, across = 0; // on a wall, x = 0.5
     for (std::uint64_t i = 0; i < 4000; ++i) {
         const Vec3 p{0.48, 0.3 * random_vec(i).y - 0.6, 0.3 * random_vec(i).z};
@@ -233,7 +233,7 @@ TEST(Roughen, FacetsArePlanesAndBedsAreSteps) {
     RoughenSettings s = fractal(0.05, 0.3, 0.3, 0.8);
     s.relief = Relief::facets;
     s.crack = 0;
-    const auto tile = heights(*roughen(*slab(1.4, 0.6, 0.02), s), 48, 0.02, 0.2);
+    const auto tile = heights(roughen(*slab(1.4, 0.6, 0.02), s), 48, 0.02, 0.2);
     int flat = 0, n = 0;
     for (int i = 1; i < 47; ++i)
         for (int j = 1; j < 47; ++j, ++n) {
@@ -245,7 +245,7 @@ TEST(Roughen, FacetsArePlanesAndBedsAreSteps) {
     EXPECT_GT(1. * flat / n, 0.6); // cells of 15 voxels: the rest are their borders
     s.relief = Relief::beds;
     s.noise.largest_m = s.noise.smallest_m = 0.2;
-    const BandReader wall(*roughen(*slab(1, 1.6, 0.02), s));
+    const BandReader wall(roughen(*slab(1, 1.6, 0.02), s));
     int level = 0;
     for (int i = 0; i < 300; ++i) {
         const Vec3 p{0.5, -0.3 - i * 0.003, 0.1};
@@ -258,13 +258,13 @@ TEST(Warp, MovesTheSurfaceByItsNoiseAndKeepsATrueDistance) {
     const auto ball = ball_grid(0.5, 0.02);
     const auto bent = warp(*ball, {{1, 0.5, 0.8, {0, 1, 0}, 1, 2}, 0.04});
     EXPECT_NEAR(static_cast<double>(bent->background()), 0.06, 1e-6);
-    const BandReader reader(*bent);
+    const BandReader reader(bent);
     double moved = 0;
     for (std::uint64_t i = 0; i < 1000; ++i)
         moved = std::max(moved, std::fabs(reader.at(normalized(random_vec(i)) * 0.5)));
     EXPECT_GT(moved, 0.03);
     EXPECT_EQ(grid_hash(*warp(*ball, {{1, 0.5, 0.8, {0, 1, 0}, 1, 2}, 0.04})), grid_hash(*bent));
-    const BandReader still(*warp(*ball, {{1, 0.5, 0.8, {0, 1, 0}, 1, 2}, 0}));
+    const BandReader still(warp(*ball, {{1, 0.5, 0.8, {0, 1, 0}, 1, 2}, 0}));
     for (std::uint64_t i = 0; i < 200; ++i)
         EXPECT_NEAR(still.at(normalized(random_vec(i)) * 0.5), 0, 0.001);
 }

@@ -40,7 +40,7 @@ TEST(Weather, ABallShrinksAsMeanCurvatureFlowSays) {
 TEST(Weather, RoundsEdgesAndLeavesFacesWhereTheyAre) {
     const auto cube = rasterize(
         SolidsField(std::vector<AnalyticSolid>{{BoxSolid{{0.4, 0.4, 0.4}, 0}, {}}}), {0.02, {}, 3});
-    const BandReader worn(*weather(*cube, {.sigma_m = 0.04, .steps = 4, .durability = {}}).solid);
+    const BandReader worn(weather(*cube, {.sigma_m = 0.04, .steps = 4, .durability = {}}).solid);
     EXPECT_NEAR(worn.at({0.4, 0, 0}), 0, 0.002); // a tenth of a voxel
     EXPECT_GT(worn.at({0.4, 0.4, 0}), 0.02);
     EXPECT_GT(worn.at({0.4, 0.4, 0.4}), worn.at({0.4, 0.4, 0}));
@@ -52,7 +52,7 @@ TEST(Weather, RoundingAndHollowingActOnTheirSideAlone) {
     const Vec3 bottom = hole.center - Vec3{0.25, 0, 0}, back{-0.5, 0, 0};
     const auto values = [&](double rounding, double hollowing) {
         const auto r = weather(*holed, {0.03, 6, rounding, hollowing, {}});
-        const BandReader reader(*r.solid);
+        const BandReader reader(r.solid);
         return std::pair{reader.at(bottom), reader.at(back)};
     };
     const auto [filled, worn] = values(1, -1);
@@ -70,7 +70,7 @@ TEST(Weather, SoftStoneWearsFasterThanDurableStone) {
     const auto ball = ball_grid(0.5, 0.02);
     WeatherSettings s{.sigma_m = 0.05, .steps = 6, .durability = {}};
     const auto spread = [&] {
-        const BandReader reader(*weather(*ball, s).solid);
+        const BandReader reader(weather(*ball, s).solid);
         double least = 1, most = -1;
         for (std::uint64_t i = 0; i < 1000; ++i) {
             const double d = reader.at(normalized(random_vec(i)) * 0.5);
