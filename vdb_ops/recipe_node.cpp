@@ -10,9 +10,7 @@
 #include "vdb_ops/clean.h"
 #include "vdb_ops/combine_field.h"
 #include "vdb_ops/csg_field.h"
-#include "vdb_ops/level_set_box.h"
 #include "vdb_ops/level_set_field.h"
-#include "vdb_ops/mesh_solid.h"
 #include "vdb_ops/offset_field.h"
 #include "vdb_ops/place.h"
 #include "vdb_ops/placed_level_set_field.h"
@@ -39,14 +37,6 @@ Box grown(const Box& box, double by_m) {
     return out;
 }
 
-/// For a scene that is sampled, surface_field() of it.
-std::shared_ptr<const Field> quick_field(const RecipeScene& scene,
-                                         std::shared_ptr<const Field> field) {
-    if (!scene.sampled || !is_slow(*field))
-        return field;
-    return surface_field(field, rasterize(*field, scene.lattice, scene.progress));
-}
-
 /// To build on: of a level set between its voxels where it has no other.
 std::shared_ptr<const Field> base_field(const NodeSolid& solid) {
     if (solid.field)
@@ -61,90 +51,6 @@ const openvdb::FloatGrid* first_giver(const std::vector<Node>& nodes) {
             return giver;
     return nullptr;
 }
-
-bool same_lattice(const openvdb::FloatGrid& grid, const Lattice& lattice) {
-    const Lattice own = lattice_of(grid);
-    return std::fabs(own.voxel_m - lattice.voxel_m) <= 1e-9 * lattice.voxel_m &&
-           length(own.origin - lattice.origin) <= 1e-9 * lattice.voxel_m &&
-           own.half_width_vox + 1e-3f >= lattice.half_width_vox;
-}
-
-// Leaves of the tree.
-
-class ShapeNode final : public RecipeNode {
-public:
-    explicit ShapeNode(const ShapeSettings& settings) : settings_(settings) {
-        shape_box(settings_); // refuses settings out of range
-    }
-    Box box(const Similarity& at) const override { return placed(shape_box(settings_), at); }
-    std::shared_ptr<const Field> field(const RecipeScene& scene,
-                                       const Similarity& at) const override {
-        return quick_field(scene, shape_field(settings_, at));
-    }
-
-private:
-    ShapeSettings settings_;
-};
-
-/// Everything on one side of a plane.
-class PlaneNode final : public RecipeNode {
-public:
-    explicit PlaneNode(const Similarity& at) : at_(at) {}
-    Box box(const Similarity& at) const override {
-        return bounds(AnalyticSolid{HalfSpaceSolid{}, at * at_});
-    }
-    std::shared_ptr<const Field> field(const RecipeScene&, const Similarity& at) const override {
-        return std::make_shared<SolidsField>(
-            std::vector<AnalyticSolid>{{HalfSpaceSolid{}, at * at_}});
-    }
-
-private:
-    Similarity at_;
-};
-
-class MeshNode final : public RecipeNode {
-public:
-    MeshNode(TriMesh mesh, std::string where, const CloseSettings& close)
-        : mesh_(std::move(mesh)), where_(std::move(where)), close_(close) {}
-    Box box(const Similarity& at) const override { return placed(bounds(mesh_), at); }
-    std::shared_ptr<const Field> field(const RecipeScene& scene,
-                                       const Similarity& at) const override {
-        const MeshSolid solid =
-            mesh_solid(placed(mesh_, at), where_, close_, scene.lattice, scene.progress);
-        for (const std::string& line : solid.diagnosis.lines(scene.lattice.voxel_m))
-            scene.found.push_back(where_ + ": " + line);
-        return quick_field(scene, solid.field);
-    }
-
-private:
-    TriMesh mesh_;
-    std::string where_;
-    CloseSettings close_;
-};
-
-class LevelSetNode final : public RecipeNode {
-public:
-    explicit LevelSetNode(openvdb::FloatGrid::Ptr grid) : grid_(std::move(grid)) {}
-    Box box(const Similarity& at) const override { return placed(level_set_box(*grid_), at); }
-    std::shared_ptr<const Field> field(const RecipeScene&, const Similarity& at) const override {
-        return std::make_shared<PlacedLevelSetField>(grid_, at);
-    }
-    NodeSolid solid(const RecipeScene& scene, const Similarity& at) const override {
-        if (at.is_identity() && same_lattice(*grid_, scene.lattice))
-            return {grid_, nullptr};
-        return RecipeNode::solid(scene, at);
-    }
-    std::shared_ptr<const Field> tile_field(const RecipeScene& scene,
-                                            const Similarity& at) const override {
-        if (at.is_identity() && same_lattice(*grid_, scene.lattice))
-            return std::make_shared<LevelSetField>(grid_);
-        return field(scene, at);
-    }
-    const openvdb::FloatGrid* lattice_giver() const override { return grid_.get(); }
-
-private:
-    openvdb::FloatGrid::Ptr grid_;
-};
 
 /// Holes of a table, or of a law in a box or in the solid before them.
 class HolesNode final : public RecipeNode {
@@ -467,22 +373,6 @@ NodeSolid RecipeNode::solid(const RecipeScene& scene, const Similarity& at) cons
 std::shared_ptr<const Field> RecipeNode::tile_field(const RecipeScene& scene,
                                                     const Similarity& at) const {
     return field(scene, at);
-}
-
-Node make_shape_node(const ShapeSettings& shape) {
-    return std::make_unique<ShapeNode>(shape);
-}
-
-Node make_plane_node(const Similarity& at) {
-    return std::make_unique<PlaneNode>(at);
-}
-
-Node make_mesh_node(TriMesh mesh, std::string where, const CloseSettings& close) {
-    return std::make_unique<MeshNode>(std::move(mesh), std::move(where), close);
-}
-
-Node make_level_set_node(openvdb::FloatGrid::Ptr grid) {
-    return std::make_unique<LevelSetNode>(std::move(grid));
 }
 
 Node make_holes_node(std::vector<Sphere> spheres) {

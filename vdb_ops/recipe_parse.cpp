@@ -1,4 +1,4 @@
-#include "vdb_ops/recipe_parse_detail.h"
+#include "vdb_ops/recipe_keys_detail.h"
 
 #include <algorithm>
 #include <cmath>
@@ -27,102 +27,8 @@ using nlohmann::json;
 using Node = std::unique_ptr<RecipeNode>;
 
 constexpr std::uint32_t kSeedStream = 0x72637065;
-constexpr double kMost_m = 1e6; // lengths and places
+constexpr double kMost_m = kMostLength_m;
 constexpr double kMostSeed = 1.8446744073709551e19;
-
-[[noreturn]] void refuse(const std::string& where, const std::string& what) {
-    throw Error(Fault::bad_input, where + ": " + what);
-}
-
-/// The body of a node, read key by key.
-class Keys {
-public:
-    Keys(const json& body, std::string where, std::initializer_list<std::string_view> required,
-         std::initializer_list<std::string_view> optional = {})
-        : body_(body), where_(std::move(where)) {
-        check_keys(body, where_, {required.begin(), required.size()},
-                   {optional.begin(), optional.size()});
-    }
-    const std::string& where() const { return where_; }
-    bool has(const char* key) const { return body_.contains(key); }
-    const json& value(const char* key) const { return body_.at(key); }
-
-    double number(const char* key, double lo, double hi) const {
-        return json_number(body_, where_, key, lo, hi);
-    }
-    double number_or(const char* key, double fallback, double lo, double hi) const {
-        return has(key) ? number(key, lo, hi) : fallback;
-    }
-    double length(const char* key) const { return number(key, 1e-9, kMost_m); }
-    std::string text(const char* key) const { return json_text(body_, where_, key); }
-    std::uint64_t whole(const char* key, double hi) const {
-        const double v = number(key, 0, hi);
-        if (v != std::floor(v))
-            refuse(where_,
-                   "'" + std::string(key) + "' is " + shortest(v) + "; must be a whole number");
-        return body_.at(key).is_number_unsigned() ? body_.at(key).get<std::uint64_t>()
-                                                  : static_cast<std::uint64_t>(v);
-    }
-    Vec3 vector(const char* key, double lo, double hi) const {
-        const json& v = numbers(key, 3, "three", lo, hi);
-        return {v[0].get<double>(), v[1].get<double>(), v[2].get<double>()};
-    }
-    std::pair<double, double> pair(const char* key, double lo, double hi) const {
-        const json& v = numbers(key, 2, "two", lo, hi);
-        return {v[0].get<double>(), v[1].get<double>()};
-    }
-    template <class... Words>
-    std::string word(const char* key, const char* fallback, Words... words) const {
-        const std::string value = has(key) ? text(key) : fallback;
-        std::string list;
-        for (const std::string_view w : {std::string_view(words)...}) {
-            if (value == w)
-                return value;
-            list += (list.empty() ? "" : ", ") + std::string(w);
-        }
-        refuse(where_,
-               "'" + std::string(key) + "' is '" + printable(value) + "'; must be one of " + list);
-    }
-
-private:
-    const json& numbers(const char* key, std::size_t n, const char* words, double lo,
-                        double hi) const {
-        const json& v = body_.at(key);
-        const auto good = [&](const json& x) {
-            return x.is_number() && x.get<double>() >= lo && x.get<double>() <= hi;
-        };
-        if (!v.is_array() || v.size() != n || !std::all_of(v.begin(), v.end(), good))
-            refuse(where_, "'" + std::string(key) + "' is " + printable(v.dump(), 60) +
-                               "; must be " + words + " numbers in " + shortest(lo) + ".." +
-                               shortest(hi));
-        return v;
-    }
-    const json& body_;
-    std::string where_;
-};
-
-/// A node made of one or more others.
-std::vector<Node> parse_children(const Keys& keys, RecipeParser& parser, std::size_t at_least) {
-    const json& of = keys.value("of");
-    std::vector<Node> nodes;
-    if (!of.is_array()) {
-        if (at_least > 1)
-            refuse(keys.where(),
-                   "'of' must be a list of " + std::to_string(at_least) + " nodes or more");
-        nodes.push_back(parse_node(of, keys.where() + ".of", parser));
-        return nodes;
-    }
-    for (std::size_t i = 0; i < of.size(); ++i)
-        nodes.push_back(parse_node(of[i], keys.where() + ".of[" + std::to_string(i) + "]", parser));
-    if (nodes.size() < at_least || (at_least == 1 && nodes.size() != 1))
-        refuse(keys.where(), "'of' has " + std::to_string(nodes.size()) + " nodes; it needs " +
-                                 (at_least == 1 ? "one" : std::to_string(at_least) + " or more"));
-    return nodes;
-}
-
-std::uint64_t seed_of(const Keys& keys, RecipeParser& parser) {
-    return keys.has("seed") ? keys.whole("seed", kMostSeed) : parser.next_seed();
-}
 
 /// A file's content, which must have the hash that the recipe says.
 std::filesystem::path asset(const Keys& keys, const char* key, const RecipeParser& parser) {
@@ -415,6 +321,10 @@ Node parse_material(const json& body, const std::string& where, RecipeParser& pa
 }
 
 constexpr std::pair<std::string_view, Parse> kNodes[] = {
+    {"rough", parse_rough},
+    {"warp", parse_warp},
+    {"weather", parse_weather},
+    {"bites", parse_bites},
     {"plane", parse_plane},
     {"mesh", parse_mesh},
     {"level_set", parse_level_set},
@@ -430,6 +340,28 @@ constexpr std::pair<std::string_view, Parse> kNodes[] = {
     {"material", parse_material}};
 
 } // namespace
+
+std::vector<Node> parse_children(const Keys& keys, RecipeParser& parser, std::size_t at_least) {
+    const json& of = keys.value("of");
+    std::vector<Node> nodes;
+    if (!of.is_array()) {
+        if (at_least > 1)
+            refuse(keys.where(),
+                   "'of' must be a list of " + std::to_string(at_least) + " nodes or more");
+        nodes.push_back(parse_node(of, keys.where() + ".of", parser));
+        return nodes;
+    }
+    for (std::size_t i = 0; i < of.size(); ++i)
+        nodes.push_back(parse_node(of[i], keys.where() + ".of[" + std::to_string(i) + "]", parser));
+    if (nodes.size() < at_least || (at_least == 1 && nodes.size() != 1))
+        refuse(keys.where(), "'of' has " + std::to_string(nodes.size()) + " nodes; it needs " +
+                                 (at_least == 1 ? "one" : std::to_string(at_least) + " or more"));
+    return nodes;
+}
+
+std::uint64_t seed_of(const Keys& keys, RecipeParser& parser) {
+    return keys.has("seed") ? keys.whole("seed", kMostSeed) : parser.next_seed();
+}
 
 std::uint64_t RecipeParser::next_seed() {
     const auto w = Rng{seed, kSeedStream}.words(n_seeded++);
