@@ -14,6 +14,7 @@
 #include "mesh_out/grain.h"
 #include "mesh_out/io/exr_file.h"
 #include "mesh_out/io/image_file.h"
+#include "mesh_out/io/mesh_formats_detail.h"
 #include "mesh_out/openness.h"
 #include "stats/core/error.h"
 #include "stats/core/rng.h"
@@ -34,6 +35,9 @@ constexpr std::uint32_t kPartStream = 0x70617274; // "part"
 }
 
 TriMesh with_openness(TriMesh surface, int n_rays, Progress* progress) {
+    check_writable(surface, "bake");
+    if (surface.normals.empty())
+        refuse("the fine surface has no normals; give one for each position");
     if (surface.openness.empty()) {
         report_stage(progress, "openness of the fine surface");
         surface.openness = openness(surface, {.n_rays = n_rays}, progress);

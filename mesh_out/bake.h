@@ -40,7 +40,8 @@ public:
 
     /// \param field  outlives this. \param surface  a fine mesh of it, with normals; openness is
     /// worked out where it has none.
-    /// \throws Error bad_argument: a length out of range, or as openness(); cancelled.
+    /// \throws Error bad_argument: a length out of range, a mesh without normals, or as openness();
+    /// cancelled.
     BakeSource(const Field& field, TriMesh surface, const BakeSourceSettings& settings,
                Progress* progress = nullptr);
 
@@ -117,8 +118,9 @@ RelitError relit_error(const TexturedMesh& coarse, const BakeSource& fine, const
 
 /// Master maps as EXR: STEM_normal, STEM_object_normal, STEM_occlusion (half), STEM_displacement,
 /// STEM_curvature, STEM_part (float), and STEM_colour (half) where there is one; channels R, G, B
-/// or Y, of parts also R, G, B as colours that tell them apart. Attributes say what the numbers
-/// are: `quantity`, `unit`, `frame`. \throws Error bad_argument: maps baked without masters; io.
+/// or Y; of parts `part`, and R, G, B as colours that tell them apart. Attributes say what the
+/// numbers are: `quantity`, `unit`, `frame`. \throws Error bad_argument: maps baked without
+/// masters; io.
 void write_maps(const std::filesystem::path& folder, const std::string& stem,
                 const BakedMaps& maps);
 

@@ -33,6 +33,8 @@ void check(const BakeArgs& args, const Console& console) {
         console.may_write(args.report, {args.solid.path, args.out});
     if (!args.maps.empty() && !std::filesystem::is_directory(args.maps))
         console.may_write(args.maps, {args.solid.path, args.out});
+    for (int j = 0; std::filesystem::is_directory(args.maps) && j < 8; ++j)
+        console.may_write(args.maps / fmt::format("level{}_normal.exr", j));
 }
 
 LodChain make_chain(const BakeArgs& args, const Solid& solid, const RecipeLod& lod,
@@ -51,10 +53,24 @@ LodChain make_chain(const BakeArgs& args, const Solid& solid, const RecipeLod& l
     return chain;
 }
 
-/// What is baked onto a level: far enough to reach what it lost, and not the next wall.
-double cage_m(const BakeArgs& args, const Measure& measure, const LodLevel& level) {
-    return args.cage.empty() ? measure.voxel_m + 2 * level.bound_m
-                             : length_m("--cage", args.cage, measure);
+/// The lengths of the options, read before any long work.
+struct Lengths {
+    double voxel_m = 0, grain_m = 0;
+    std::optional<double> fixed_cage_m;
+
+    /// Far enough to reach what a level lost, and not the next wall.
+    double cage_m(const LodLevel& level) const {
+        return fixed_cage_m.value_or(voxel_m + 2 * level.bound_m);
+    }
+};
+
+Lengths lengths(const BakeArgs& args, const Measure& measure) {
+    Lengths out{.voxel_m = measure.voxel_m, .grain_m = 0, .fixed_cage_m = {}};
+    if (!args.grain.empty())
+        out.grain_m = length_m("--grain", args.grain, measure);
+    if (!args.cage.empty())
+        out.fixed_cage_m = length_m("--cage", args.cage, measure);
+    return out;
 }
 
 nlohmann::ordered_json maps_json(const BakedLevel& baked) {
@@ -83,22 +99,21 @@ void tell(const BakeArgs& args, std::size_t j, const LodLevel& level, const Bake
 
 /// The levels as they go into the file, and their figures into the report.
 std::vector<EncodedLevel> bake_levels(const BakeArgs& args, const LodChain& chain,
-                                      const BakeSource& source, const Measure& measure,
+                                      const BakeSource& source, const Lengths& sizes,
                                       const Console& console, nlohmann::ordered_json& report) {
     const std::vector<double> coverages = screen_coverages(chain);
     std::vector<EncodedLevel> out;
-    const double grain_m = args.grain.empty() ? 0 : length_m("--grain", args.grain, measure);
     double texel_per_bound = 0; // of the first level with maps: others are seen from farther
     for (std::size_t j = 0; j < chain.levels.size(); ++j) {
         const LodLevel& level = chain.levels[j];
         out.push_back(level.encoded);
         if (!args.only || static_cast<std::size_t>(*args.only) == j) {
             BakedLevel baked = bake_level(level, source,
-                                          {.reach_m = cage_m(args, measure, level),
+                                          {.reach_m = sizes.cage_m(level),
                                            .side_px = args.size_px,
                                            .texel_m = texel_per_bound * level.bound_m,
                                            .gutter_px = args.gutter_px,
-                                           .grain_m = grain_m,
+                                           .grain_m = sizes.grain_m,
                                            .grain_contrast = args.grain_contrast,
                                            .occlusion = !args.levels.no_ao,
                                            .masters = !args.maps.empty()},
@@ -109,7 +124,7 @@ std::vector<EncodedLevel> bake_levels(const BakeArgs& args, const LodChain& chai
             report["levels"][j]["bytes"] = baked.encoded.draco.size();
             report["levels"][j]["maps"] = maps_json(baked);
             if (!args.maps.empty())
-                write_maps(args.maps, "level" + std::to_string(j), baked.maps);
+                write_maps(args.maps, fmt::format("level{}", j), baked.maps);
             out.back() = std::move(baked.encoded);
         }
         out.back().screen_coverage = coverages[j];
@@ -121,19 +136,20 @@ void run(const BakeArgs& args, const Console& console) {
     check(args, console);
     const Solid solid = read_solid(args.solid, console, Surfaces::wanted);
     const RecipeLod lod = args.levels.lod(solid.measure, level_set_box(*solid.grid).size().y);
+    const Lengths sizes = lengths(args, solid.measure);
     const LodChain chain = make_chain(args, solid, lod, console);
     std::shared_ptr<const Field> field = solid.field;
     if (!field)
         field = std::make_shared<PlacedLevelSetField>(solid.grid);
     double reach_m = 0;
     for (const LodLevel& level : chain.levels)
-        reach_m = std::max(reach_m, cage_m(args, solid.measure, level));
+        reach_m = std::max(reach_m, sizes.cage_m(level));
     const BakeSource source = bake_source(*solid.grid, *field, reach_m,
                                           lod.openness ? args.ao_rays : 0, console.progress);
     if (!args.maps.empty())
         std::filesystem::create_directories(args.maps);
     auto report = nlohmann::ordered_json::parse(format_report(chain, base_name(args.out)));
-    const auto levels = bake_levels(args, chain, source, solid.measure, console, report);
+    const auto levels = bake_levels(args, chain, source, sizes, console, report);
     GlbSettings glb{.recipe = format_recipe(solid.node, solid.measure.voxel_m, 0, lod)};
     if (lod.at_foot)
         glb.shift = foot_shift(chain.levels.front().certificate.box);

@@ -435,6 +435,12 @@ TEST(Bake, NamesWhatItCannotUse) {
     refuses(outside, {.reach_m = 0.06}, "texture[3] is 1.5");
     expect_error(Fault::bad_argument, "voxel_m is 0.000000",
                  [&] { const BakeSource none(field, ball(1), {.reach_m = 0.06}); });
+    expect_error(Fault::bad_argument, "the fine surface has no normals", [&] {
+        const BakeSource none(field, icosphere(1), {.voxel_m = 0.01, .reach_m = 0.06});
+    });
+    refuses(low, {.reach_m = 0.06, .grain_m = -1}, "grain_m is -1.000000, must be finite and >= 0");
+    refuses(low, {.reach_m = 0.06, .grain_contrast = 2},
+            "grain_contrast is 2.000000, must be 0..1");
     const BakedMaps maps = bake(low, fine, {.reach_m = 0.06, .side_px = 64, .masters = false});
     expect_error(Fault::bad_argument, "baked without masters",
                  [&] { write_maps("nowhere", "level0", maps); });
