@@ -1,10 +1,8 @@
 #include "vdb_ops/recipe_node_detail.h"
 
 #include <algorithm>
-#include <cmath>
 
 #include "stats/core/error.h"
-#include "stats/number_detail.h"
 #include "vdb_ops/balls_field.h"
 #include "vdb_ops/carve.h"
 #include "vdb_ops/clean.h"
@@ -15,7 +13,6 @@
 #include "vdb_ops/place.h"
 #include "vdb_ops/placed_level_set_field.h"
 #include "vdb_ops/rasterize.h"
-#include "vdb_ops/solids_field.h"
 #include "vdb_ops/stored_field.h"
 #include "vdb_ops/surface_field.h"
 

@@ -1,9 +1,8 @@
-#include "vdb_ops/recipe_keys_detail.h"
+#include "vdb_ops/recipe_parse_detail.h"
 
 #include <algorithm>
 #include <cmath>
 #include <numbers>
-#include <span>
 #include <tuple>
 #include <utility>
 
@@ -17,7 +16,7 @@
 #include "stats/io/holes_file.h"
 #include "stats/io/json_detail.h"
 #include "stats/io/law_file.h"
-#include "stats/number_detail.h"
+#include "vdb_ops/recipe_keys_detail.h"
 #include "vdb_ops/vdb_file.h"
 
 namespace taihu {

@@ -18,6 +18,7 @@ namespace {
 using openvdb::Coord;
 using openvdb::FloatGrid;
 constexpr std::uint32_t kWarpStream = 0x77617270;
+constexpr double kDepth = 0.25; ///< under a mouth / its radius: from there on it is inside
 
 void require(bool good, const char* what, double value, const char* range) {
     if (!good)
@@ -40,7 +41,7 @@ FloatGrid::Ptr closed_outside(const FloatGrid& solid, double mouth_m, Progress* 
         return settled(moved, own, progress);
     };
     const auto closed = grown_to(*grown_to(solid, mouth_m), -mouth_m);
-    return wide_band(*closed, 0.5 * mouth_m, "roughen", progress);
+    return wide_band(*closed, kDepth * mouth_m, "roughen", progress);
 }
 
 /// Waves shorter than two voxels would be sampled as something else.
@@ -178,9 +179,9 @@ FloatGrid::Ptr roughen(const FloatGrid& solid, const RoughenSettings& s, const S
                 return d;
             const Vec3 normal = near.normal(c), foot = near.place(c) - normal * d;
             const double inside =
-                outside
-                    ? std::clamp(-2 * holes.at(foot) / (s.inside->mouth_m * at.scale()), 0.0, 1.0)
-                    : 0;
+                outside ? std::clamp(-holes.at(foot) / (kDepth * s.inside->mouth_m * at.scale()),
+                                     0.0, 1.0)
+                        : 0;
             return d -
                    at.scale() * displacement.at(back.point(foot), back.direction(normal), inside);
         };

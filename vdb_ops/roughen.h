@@ -25,7 +25,7 @@ struct FacingShares {
 /// The share inside of holes: of what lies under a mouth that a ball of this radius does not pass.
 struct InsideShare {
     double mouth_m = 0.1; ///< > 0
-    double share = 0;     ///< 0..10, reached half a mouth's radius down
+    double share = 0;     ///< 0..10, reached a quarter of that radius down
 };
 
 /// Shares of the amplitude by height, straight from `bottom_m` to `top_m` (Y), level beyond.

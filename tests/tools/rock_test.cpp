@@ -89,7 +89,7 @@ TEST(Rock, PresetsAreRocksOfAnyHeightAndSeed) {
     must(preset + "--seed 7 -o a.vdb -q", folder);
     must(preset + "--seed 7 --threads 1 -o b.vdb -q", folder);
     must(preset + "--seed 8 -o c.vdb -q", folder);
-    must(preset + "--seed 7 --set porosity=0.1 -o d.vdb -q", folder);
+    must(preset + "--seed 7 --set holes=1 -o d.vdb -q", folder);
     EXPECT_TRUE(same_bytes(folder, "a.vdb", "b.vdb"));
     EXPECT_FALSE(same_bytes(folder, "a.vdb", "c.vdb"));
     const auto measured = [&](const char* file) {
@@ -106,7 +106,7 @@ TEST(Rock, PresetsAreRocksOfAnyHeightAndSeed) {
 TEST(Rock, EachPresetIsACertifiedRock) {
     const Scratch folder;
     const json list = json::parse(run("taihu rock --list --json", folder.path()).out);
-    EXPECT_GE(list.size(), 11u);
+    EXPECT_GE(list.size(), 12u);
     for (const auto& [name, about] : list.items()) {
         must("taihu rock --preset " + name + " --dim 32 -o rock.ply -q", folder);
         must("taihu check rock.ply -q", folder);
@@ -140,8 +140,8 @@ TEST(Rock, SaysWhatIsWrongInOneLine) {
     EXPECT_THAT(refusal("taihu rock r.json -o a.vdb", 1),
                 HasSubstr("r.json: solid.sphere: 'size_m'"));
     EXPECT_THAT(refusal("taihu rock -o a.vdb", 2), HasSubstr("say what to make"));
-    EXPECT_THAT(refusal("taihu rock --preset taihu --set porosty=1 -o a.vdb", 2),
-                HasSubstr("did you mean 'porosity'"));
+    EXPECT_THAT(refusal("taihu rock --preset taihu --set hole=1 -o a.vdb", 2),
+                HasSubstr("did you mean 'holes'"));
     EXPECT_THAT(refusal("taihu rock --preset taihu", 2), HasSubstr("say where to write it"));
     write_file(folder / "ball.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n");
     EXPECT_THAT(refusal("taihu rock --from ball.obj -o a.vdb", 1), HasSubstr("carries no recipe"));

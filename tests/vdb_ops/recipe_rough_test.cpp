@@ -81,18 +81,18 @@ TEST(RecipeRough, EstimatesComeFromACoarserSolid) {
 
 TEST(RecipeRough, TilesAreRefusedByName) {
     const Scratch scratch;
-    expect_error(
-        Fault::unsupported,
-        "r.json: solid.rough: needs the whole solid in memory, and tiles are made one by "
-        "one; make it without --tiles",
-        [&] { make_recipe_tiles(recipe(kRough), "r.json", {}, {}, scratch / "t", 64); });
+    expect_error(Fault::unsupported,
+                 "r.json: solid.rough: needs the whole solid in memory, and tiles are made one by "
+                 "one; make it without --tiles",
+                 [&] { make_recipe_tiles(recipe(kRough), "r.json", {}, {}, scratch / "t", 64); });
 }
 
 TEST(RecipeRough, SaysWhereANodeIsWrong) {
     const auto refused = [](const std::string& solid, const std::string& what) {
         expect_error(Fault::bad_input, what, [&] { made(recipe(solid)); });
     };
-    refused(node("rough", R"("amplitude_m": 0.1)"), "r.json: solid.rough: key 'largest_m' is missing");
+    refused(node("rough", R"("amplitude_m": 0.1)"),
+            "r.json: solid.rough: key 'largest_m' is missing");
     refused(node("rough", R"("amplitude": 0.1, "largest_m": 1)"), "did you mean 'amplitude_m'");
     refused(node("rough", R"("amplitude_m": -1, "largest_m": 1)"), "'amplitude_m' is -1");
     refused(node("rough", R"("amplitude_m": 0.1, "largest_m": 1, "relief": "bumps")"),
