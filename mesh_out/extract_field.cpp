@@ -10,6 +10,7 @@
 #include "mesh_out/extract_mesher_detail.h"
 #include "mesh_out/extract_parts_detail.h"
 #include "mesh_out/level_set_check_detail.h"
+#include "mesh_out/piece_sides_detail.h"
 #include "stats/core/error.h"
 #include "stats/number_detail.h"
 #include "vdb_ops/level_set_probe_detail.h"
@@ -84,6 +85,7 @@ LabelledMesh extract(const openvdb::FloatGrid& solid, const Field* field,
         if (stuck.empty() || attempt + 1 == kMostAttempts) {
             LabelledMesh mesh = mesher.take();
             part_long_triangles(mesh, *probe, lattice, settings.bound_vox / 2, progress);
+            turn_small_pieces(mesh.positions, mesh.triangles);
             return mesh;
         }
         for (const std::uint32_t v : stuck)

@@ -16,6 +16,7 @@
 #include "mesh_out/lost_surface_detail.h"
 #include "mesh_out/openness.h"
 #include "mesh_out/part_sheets_detail.h"
+#include "mesh_out/piece_sides_detail.h"
 #include "mesh_out/small_pieces_detail.h"
 #include "mesh_out/surface_distance.h"
 #include "stats/core/error.h"
@@ -102,7 +103,7 @@ private:
     TriMesh snapped(const BoundedMesh& mesh, double bound_m, double most_m,
                     PositionGrid& grid) const;
     void name_lost(LodLevel& level, const std::vector<Vec3>& dropped) const;
-    Written written(const BoundedMesh& mesh, double bound_m, double move_m) const;
+    Written written(const BoundedMesh& mesh, double bound_m, double move_m, double speck) const;
     std::vector<Sphere> around(const std::vector<Vec3>& points, double radius_m) const;
     bool simplified(double bound_m, LabelledMesh& surface, LodLevel& level) const;
     bool within(double bound_m, const LodLevel* before, LodLevel& level);
@@ -301,16 +302,18 @@ void Chain::name_lost(LodLevel& level, const std::vector<Vec3>& dropped) const {
         level.unresolved.push_back({ball.center, ball.radius_m, level.unresolved_error_m});
 }
 
-/// `mesh` as a file holds it: snapped, coded, decoded; certified and measured as decoded.
-Chain::Written Chain::written(const BoundedMesh& mesh, double bound_m, double move_m) const {
+/// `mesh` as a file holds it, without specks: snapped, coded, decoded; certified and measured so.
+Chain::Written Chain::written(const BoundedMesh& mesh, double bound_m, double move_m,
+                              double speck) const {
     Written out;
     LodLevel& level = out.level;
     level.bound_m = bound_m;
     level.unresolved = mesh.unresolved;
     level.closed = model_.closed;
     TriMesh mesh_on_grid = snapped(mesh, bound_m, move_m, level.grid);
+    turn_small_pieces(mesh_on_grid.positions, mesh_on_grid.triangles);
     std::vector<Vec3> dropped;
-    for (double speck = kSpeck;; speck *= 2) {
+    for (;; speck = std::max(2 * speck, kSpeck)) {
         const std::vector<Vec3> more = drop_small_pieces(mesh_on_grid, speck * bound_m);
         dropped.insert(dropped.end(), more.begin(), more.end());
         if (settings_.openness)
@@ -327,7 +330,6 @@ Chain::Written Chain::written(const BoundedMesh& mesh, double bound_m, double mo
         for (const auto& [f, g] : crossing_pairs(decoded.positions, decoded.triangles))
             for (const std::uint32_t v : decoded.triangles[f])
                 out.crossings.push_back(decoded.positions[v]);
-    check_cancelled(progress_);
     name_lost(level, dropped);
     std::vector<Sphere> apart;
     for (const UnresolvedPlace& place : level.unresolved)
@@ -368,7 +370,8 @@ bool Chain::simplified(double bound_m, LabelledMesh& surface, LodLevel& level) c
     std::vector<Sphere> kept;
     for (int attempt = 0;; ++attempt) {
         BoundedSimplifier next = start;
-        Written out = written(next.within(inner_m, kept, progress_), bound_m, max_move_m(bound_m));
+        Written out =
+            written(next.within(inner_m, kept, progress_), bound_m, max_move_m(bound_m), kSpeck);
         level = std::move(out.level);
         const double share = double(out.beyond.size()) / double(out.n_samples);
         const bool last = attempt + 1 == kAttempts || share <= few;
@@ -443,7 +446,7 @@ bool Chain::of_triangles(std::size_t n, LodLevel& level, std::string& why) {
     last_ = start.surface();
     const double bound_m = mesh.bound_m / (1 - kRoundingShare);
     // Rounding may take some triangles more: not many.
-    level = written(mesh, bound_m, max_move_m(bound_m) / 4).level;
+    level = written(mesh, bound_m, max_move_m(bound_m) / 4, 0).level;
     level.bound_m = std::max(bound_m, level.error_m);
     return true;
 }
@@ -457,26 +460,23 @@ LodChain Chain::make() {
         check_cancelled(progress_);
         const LodGoal& goal = settings_.levels[j];
         LodLevel level;
-        bool made = true;
+        const LodLevel* before = j > 0 ? &chain.levels.back() : nullptr;
         std::string why;
-        if (goal.n_triangles > 0)
-            made = of_triangles(goal.n_triangles, level, why);
-        else
-            made = within(goal.bound_m, j > 0 ? &chain.levels.back() : nullptr, level);
-        if (!why.empty() && j > 0) {
+        const bool made = goal.n_triangles > 0 ? of_triangles(goal.n_triangles, level, why)
+                                               : within(goal.bound_m, before, level);
+        if (!why.empty() && !before)
+            throw Error(Fault::numeric, "lod: " + why);
+        if (!why.empty()) {
             chain.note = std::to_string(j) + " of " + std::to_string(n) + " levels: " + why;
             break;
         }
-        if (!why.empty())
-            throw Error(Fault::numeric, "lod: " + why);
-        if (!made && j == 0)
+        if (!made && !before)
             throw Error(Fault::numeric, "lod: the bound " + shown(level.bound_m) +
                                             " m cannot be met, the best mesh is " +
                                             shown(level.error_m) + " m off; ask for " +
                                             shown(1.05 * level.error_m) +
                                             " m or more, or use smaller voxels");
-        if (!made || (j > 0 && level.certificate.n_triangles >=
-                                   chain.levels.back().certificate.n_triangles)) {
+        if (!made || (before && level.certificate.n_triangles >= before->certificate.n_triangles)) {
             chain.note = std::to_string(j) + " of " + std::to_string(n) + " levels: within " +
                          shown(level.bound_m) + " m no mesh with fewer triangles than level " +
                          std::to_string(j - 1) + " was found";

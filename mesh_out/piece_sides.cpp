@@ -1,6 +1,8 @@
 #include "mesh_out/piece_sides_detail.h"
 
+#include <algorithm>
 #include <limits>
+#include <numeric>
 #include <vector>
 
 #include "mesh_out/crossings_detail.h"
@@ -9,6 +11,7 @@
 namespace taihu {
 namespace {
 
+constexpr std::size_t kSmallPiece = 200; ///< faces
 constexpr std::uint32_t kNone = std::numeric_limits<std::uint32_t>::max();
 
 /// How often, and to which side, a face goes round the line through `p` along X: an edge counts
@@ -26,19 +29,20 @@ int turns(const Vec3& p, const Vec3& a, const Vec3& b, const Vec3& c) {
     return passed(a, b) + passed(b, c) + passed(c, a);
 }
 
-} // namespace
-
-std::size_t count_misplaced_pieces(std::span<const Vec3> positions, std::span<const Triangle> faces,
-                                   std::span<const std::uint32_t> piece_of,
-                                   std::span<const double> volume) {
-    std::vector<std::uint32_t> farthest(faces.size(), kNone); // vertex of a piece along X
+/// Which of the pieces with a volume face the wrong way, by the faces round their farthest vertices
+/// along X.
+std::vector<std::uint32_t> misplaced(std::span<const Vec3> positions,
+                                     std::span<const Triangle> faces,
+                                     std::span<const std::uint32_t> piece_of,
+                                     std::span<const double> volume) {
+    std::vector<std::uint32_t> farthest(volume.size(), kNone);
     for (std::size_t f = 0; f < faces.size(); ++f)
         for (const std::uint32_t v : faces[f])
             if (std::uint32_t& far = farthest[piece_of[f]];
                 far == kNone || positions[v].x > positions[far].x)
                 far = v;
     const FaceTree tree(positions, faces);
-    std::size_t n = 0;
+    std::vector<std::uint32_t> found;
     for (std::uint32_t piece = 0; piece < farthest.size(); ++piece) {
         if (farthest[piece] == kNone || volume[piece] == 0)
             continue;
@@ -55,9 +59,56 @@ std::size_t count_misplaced_pieces(std::span<const Vec3> positions, std::span<co
             if (round != 0 && orient3d(positions[a], positions[b], positions[c], p) * round < 0)
                 depth += round;
         });
-        n += depth != (volume[piece] > 0 ? 0 : 1);
+        if (depth != (volume[piece] > 0 ? 0 : 1))
+            found.push_back(piece);
     }
-    return n;
+    return found;
+}
+
+} // namespace
+
+std::size_t count_misplaced_pieces(std::span<const Vec3> positions, std::span<const Triangle> faces,
+                                   std::span<const std::uint32_t> piece_of,
+                                   std::span<const double> volume) {
+    return misplaced(positions, faces, piece_of, volume).size();
+}
+
+void turn_small_pieces(std::span<const Vec3> positions, std::span<Triangle> faces) {
+    std::vector<std::uint32_t> parent(positions.size());
+    std::iota(parent.begin(), parent.end(), 0u);
+    const auto root = [&](std::uint32_t v) {
+        while (parent[v] != v)
+            v = parent[v] = parent[parent[v]];
+        return v;
+    };
+    for (const Triangle& t : faces)
+        for (const std::uint32_t v : {t[1], t[2]}) {
+            const std::uint32_t a = root(t[0]), b = root(v);
+            parent[std::max(a, b)] = std::min(a, b);
+        }
+    std::vector<std::uint32_t> piece_of(faces.size());
+    std::vector<std::size_t> n_faces(positions.size());
+    for (std::size_t f = 0; f < faces.size(); ++f)
+        ++n_faces[piece_of[f] = root(faces[f][0])];
+    std::vector<double> volume(positions.size());
+    bool any = false;
+    for (std::size_t f = 0; f < faces.size(); ++f) {
+        const std::uint32_t piece = piece_of[f];
+        if (n_faces[piece] > kSmallPiece || n_faces[piece] == faces.size())
+            continue;
+        const Vec3& o = positions[piece]; // itself a vertex of it
+        const auto& [a, b, c] = faces[f];
+        volume[piece] += dot(positions[a] - o, cross(positions[b] - o, positions[c] - o));
+        any = true;
+    }
+    if (!any)
+        return;
+    std::vector<std::uint8_t> turned(positions.size());
+    for (const std::uint32_t piece : misplaced(positions, faces, piece_of, volume))
+        turned[piece] = 1;
+    for (std::size_t f = 0; f < faces.size(); ++f)
+        if (turned[piece_of[f]])
+            std::swap(faces[f][1], faces[f][2]);
 }
 
 } // namespace taihu

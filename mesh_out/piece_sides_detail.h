@@ -16,4 +16,8 @@ std::size_t count_misplaced_pieces(std::span<const Vec3> positions, std::span<co
                                    std::span<const std::uint32_t> piece_of,
                                    std::span<const double> volume);
 
+/// Turns those of at most 200 faces that face the wrong way: pieces of a voxel or two, whose
+/// vertices changed sides when they were put on the surface.
+void turn_small_pieces(std::span<const Vec3> positions, std::span<Triangle> faces);
+
 } // namespace taihu
