@@ -2,11 +2,11 @@
 
 #include <algorithm>
 #include <limits>
-#include <numeric>
 #include <vector>
 
 #include "mesh_out/crossings_detail.h"
 #include "mesh_out/face_tree_detail.h"
+#include "mesh_out/partition_detail.h"
 
 namespace taihu {
 namespace {
@@ -74,22 +74,14 @@ std::size_t count_misplaced_pieces(std::span<const Vec3> positions, std::span<co
 }
 
 void turn_small_pieces(std::span<const Vec3> positions, std::span<Triangle> faces) {
-    std::vector<std::uint32_t> parent(positions.size());
-    std::iota(parent.begin(), parent.end(), 0u);
-    const auto root = [&](std::uint32_t v) {
-        while (parent[v] != v)
-            v = parent[v] = parent[parent[v]];
-        return v;
-    };
+    Partition pieces(positions.size());
     for (const Triangle& t : faces)
-        for (const std::uint32_t v : {t[1], t[2]}) {
-            const std::uint32_t a = root(t[0]), b = root(v);
-            parent[std::max(a, b)] = std::min(a, b);
-        }
+        for (const std::uint32_t v : {t[1], t[2]})
+            pieces.join(t[0], v);
     std::vector<std::uint32_t> piece_of(faces.size());
     std::vector<std::size_t> n_faces(positions.size());
     for (std::size_t f = 0; f < faces.size(); ++f)
-        ++n_faces[piece_of[f] = root(faces[f][0])];
+        ++n_faces[piece_of[f] = pieces.find(faces[f][0])];
     std::vector<double> volume(positions.size());
     bool any = false;
     for (std::size_t f = 0; f < faces.size(); ++f) {

@@ -1,32 +1,24 @@
 #include "mesh_out/small_pieces_detail.h"
 
 #include <limits>
-#include <numeric>
 
+#include "mesh_out/partition_detail.h"
 #include "stats/core/box.h"
 
 namespace taihu {
 
 std::vector<Vec3> drop_small_pieces(TriMesh& mesh, double longest_m) {
     const std::size_t n = mesh.positions.size();
-    std::vector<std::uint32_t> parent(n);
-    std::iota(parent.begin(), parent.end(), 0u);
-    const auto root = [&](std::uint32_t v) {
-        while (parent[v] != v)
-            v = parent[v] = parent[parent[v]];
-        return v;
-    };
+    Partition pieces(n);
     for (const Triangle& t : mesh.triangles)
-        for (const std::uint32_t v : {t[1], t[2]}) {
-            const std::uint32_t a = root(t[0]), b = root(v);
-            parent[std::max(a, b)] = std::min(a, b);
-        }
+        for (const std::uint32_t v : {t[1], t[2]})
+            pieces.join(t[0], v);
     std::vector<Box> boxes(n);
     for (std::uint32_t v = 0; v < n; ++v)
-        boxes[root(v)].include(mesh.positions[v]);
+        boxes[pieces.find(v)].include(mesh.positions[v]);
     double most = 0;
     for (std::uint32_t v = 0; v < n; ++v)
-        if (parent[v] == v)
+        if (pieces.find(v) == v)
             most = std::max(most, boxes[v].longest());
     constexpr auto kGone = std::numeric_limits<std::uint32_t>::max();
     std::vector<std::uint32_t> renamed(n, kGone);
@@ -37,7 +29,7 @@ std::vector<Vec3> drop_small_pieces(TriMesh& mesh, double longest_m) {
             of_vertices[n_kept] = of_vertices[v];
     };
     for (std::uint32_t v = 0; v < n; ++v) {
-        const double size = boxes[root(v)].longest();
+        const double size = boxes[pieces.find(v)].longest();
         if (size <= longest_m && size < most) {
             gone.push_back(mesh.positions[v]);
             continue;
