@@ -86,7 +86,7 @@ double FaceErrors::bound_beside(std::uint32_t shape, const Range& range, const C
     const auto is_near = [&](const Shape& s) {
         if (!s.is_ball)
             return rules.clear_m <= 2 * radius + reach &&
-                   std::abs(field_.of(s.primitive, m).value_m) <= reach;
+                   std::abs(field_.value_of(s.primitive, m)) <= reach;
         const double d2 = length_squared(m - s.center), far = s.radius + reach,
                      deep = s.radius - reach;
         return d2 <= far * far && (deep <= 0 || d2 >= deep * deep);
@@ -134,7 +134,7 @@ FaceErrors::Clearance FaceErrors::clearance(const Vec3& p, std::uint32_t label) 
         const double at_least = std::abs(value) - off_center;
         least.sampled = std::min(least.sampled, at_least > 2 * spacing_
                                                     ? at_least
-                                                    : std::abs(field_.of(s.primitive, p).value_m));
+                                                    : std::abs(field_.value_of(s.primitive, p)));
     }
     least.any = std::min(least.any, least.sampled);
     return least;

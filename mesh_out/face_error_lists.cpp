@@ -90,15 +90,15 @@ std::array<int, 3> FaceErrors::coordinates(std::size_t cell) const {
 
 void FaceErrors::find_center_values() {
     center_values_.assign(near_.size(), 0);
-    tbb::parallel_for(
-        tbb::blocked_range<std::size_t>(0, cells_.size(), 4096), [&](const auto& range) {
-            for (std::size_t c = range.begin(); c < range.end(); ++c)
-                for (std::uint32_t i = cells_[c] == kNone ? 0 : first_[cells_[c]];
-                     cells_[c] != kNone && i < first_[cells_[c] + 1]; ++i)
-                    if (const Shape& s = shapes_[near_[i]]; !s.is_ball)
-                        center_values_[i] = static_cast<float>(
-                            field_.of(s.primitive, center_of(coordinates(c))).value_m);
-        });
+    tbb::parallel_for(tbb::blocked_range<std::size_t>(0, cells_.size(), 4096),
+                      [&](const auto& range) {
+                          for (std::size_t c = range.begin(); c < range.end(); ++c)
+                              for (std::uint32_t i = cells_[c] == kNone ? 0 : first_[cells_[c]];
+                                   cells_[c] != kNone && i < first_[cells_[c] + 1]; ++i)
+                                  if (const Shape& s = shapes_[near_[i]]; !s.is_ball)
+                                      center_values_[i] = static_cast<float>(
+                                          field_.value_of(s.primitive, center_of(coordinates(c))));
+                      });
 }
 
 void FaceErrors::find_shapes(const LabelledMesh& mesh) {
@@ -116,8 +116,7 @@ void FaceErrors::find_shapes(const LabelledMesh& mesh) {
         s.primitive = p;
         if (const auto ball = field_.ball(p)) {
             const Vec3 beside = ball->center + Vec3{2 * ball->radius_m, 0, 0};
-            s = {p, true, field_.of(p, beside).value_m > 0 ? 1. : -1., ball->center,
-                 ball->radius_m};
+            s = {p, true, field_.value_of(p, beside) > 0 ? 1. : -1., ball->center, ball->radius_m};
         }
         shapes_.push_back(s);
     }

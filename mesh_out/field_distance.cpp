@@ -20,6 +20,7 @@ namespace {
 constexpr double kOn = 1e-3;        ///< of the spacing: on the surface
 constexpr double kFarthest = 8;     ///< spacings that a projection may take
 constexpr std::size_t kChunk = 512; ///< faces or points that are summed together
+constexpr double kClose = 0.8;      ///< of the limit: looked at more closely
 constexpr int kFinest = 64;         ///< parts of an edge
 
 /// The nearest point of the surface that can be reached by projecting onto the primitive that
@@ -160,9 +161,22 @@ FieldDistance field_distance(const TriMesh& mesh, const FieldProbe& field, const
         each_inside({points[t[0]], points[t[1]], points[t[2]]}, spacing_m,
                     [&](const Vec3& p) { add(p, sum); });
     }));
-    const Sum back = summed(surface.positions.size(), progress, [&](std::size_t i, Sum& sum) {
-        sum.add(surface.positions[i], to_mesh(surface.positions[i]), limit_m, apart);
+    std::vector<std::uint8_t> is_close(surface.positions.size()); // to the limit
+    Sum back = summed(surface.positions.size(), progress, [&](std::size_t i, Sum& sum) {
+        const double d = to_mesh(surface.positions[i]);
+        is_close[i] = d > kClose * limit_m;
+        sum.add(surface.positions[i], d, limit_m, apart);
     });
+    back.add(summed(surface.triangles.size(), progress, [&](std::size_t f, Sum& sum) {
+        const Triangle& t = surface.triangles[f];
+        if (!is_close[t[0]] && !is_close[t[1]] && !is_close[t[2]])
+            return;
+        const Vec3 a = surface.positions[t[0]], b = surface.positions[t[1]],
+                   c = surface.positions[t[2]];
+        for (const Vec3& p : {(a + b) / 2, (b + c) / 2, (c + a) / 2, (a + b + c) / 3})
+            if (const auto y = surface_point(field, p, spacing_m))
+                sum.add(*y, to_mesh(*y), limit_m, apart);
+    }));
     FieldDistance result;
     result.max_to_field_m = there.most;
     result.max_from_field_m = back.most;

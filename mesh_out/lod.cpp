@@ -13,6 +13,7 @@
 #include "mesh_out/crossings_detail.h"
 #include "mesh_out/extract.h"
 #include "mesh_out/field_distance.h"
+#include "mesh_out/held_surface_detail.h"
 #include "mesh_out/lost_surface_detail.h"
 #include "mesh_out/openness.h"
 #include "mesh_out/part_sheets_detail.h"
@@ -40,6 +41,7 @@ constexpr double kFewBeyondGrown = 1e-3; ///< as kFewBeyond, of levels on coarse
 constexpr double kShrink = 0.68, kLeastShrink = 1. / 3; ///< of levels, as Chain::shrink_
 constexpr int kCoarsest = 8;                            ///< voxels along one of a level's own
 constexpr double kLeastMove = 1.0 / 16; ///< of what rounding may take, where faces would cross
+constexpr double kLost = 0.5;           ///< of the finest bound: not worth a look
 constexpr double kNearly = 0.75;        ///< of a bound, at one point: beyond it beside
 constexpr double kSpeck = 2, kLargestSpeck = 16; ///< bounds: pieces that long are dropped
 constexpr int kAttempts = 2, kMostLevels = 8, kMostBits = 18;
@@ -167,7 +169,8 @@ Chain::Chain(const openvdb::FloatGrid& solid, const Field* field, const LodSetti
         own_ = std::make_unique<PlacedLevelSetField>(solid.copy()); // its band may be widened
         field_ = own_.get();
     } else {
-        lost_ = lost_surface(solid, *probe(*field, 2 * voxel_m_), progress);
+        lost_ = lost_surface(solid, *probe(*field, 2 * voxel_m_), SurfaceDistance(reference_),
+                             kLost * finest_bound_m(), progress);
     }
 }
 
@@ -209,34 +212,12 @@ bool Chain::use_coarser(double bound_m, LabelledMesh& surface) {
 
 /// What was shut is not held to the bound, but named.
 void Chain::drop_shut(double bound_m, const LabelledMesh& surface) {
-    const SurfaceDistance to_surface({surface.positions, surface.triangles, {}});
-    const double deep_m = model_.off_m + kShut * bound_m;
-    enum : std::uint8_t { kHeld, kFilled, kWay };
-    std::vector<std::uint8_t> shut(reference_.positions.size(), kHeld);
-    tbb::parallel_for(std::size_t{0}, shut.size(), [&](std::size_t v) {
-        const Vec3& p = reference_.positions[v];
-        if (!(model_.probe->at(p).value_m < 0) || to_surface(p) <= deep_m)
-            return;
-        const bool is_filled =
-            std::any_of(model_.closed.begin(), model_.closed.end(), [&](const Sphere& s) {
-                return length(p - s.center) <= s.radius_m + bound_m;
-            });
-        shut[v] = is_filled ? kFilled : kWay;
-    });
-    std::vector<std::uint32_t> renamed(shut.size());
-    std::vector<Vec3> ways; // into what was not filled
-    for (std::size_t v = 0; v < shut.size(); ++v) {
-        renamed[v] = static_cast<std::uint32_t>(model_.held.positions.size());
-        if (shut[v] == kHeld)
-            model_.held.positions.push_back(reference_.positions[v]);
-        if (shut[v] == kWay)
-            ways.push_back(reference_.positions[v]);
-    }
-    for (const Triangle& t : reference_.triangles)
-        if (!shut[t[0]] && !shut[t[1]] && !shut[t[2]])
-            model_.held.triangles.push_back({renamed[t[0]], renamed[t[1]], renamed[t[2]]});
-    const std::vector<Sphere> more = around(ways, bound_m);
-    model_.closed.insert(model_.closed.end(), more.begin(), more.end());
+    HeldSurface held =
+        held_surface(reference_, {surface.positions, surface.triangles, {}}, *model_.probe,
+                     model_.closed, model_.off_m + kShut * bound_m, bound_m);
+    model_.held = std::move(held.mesh);
+    const std::vector<Sphere> ways = around(held.shut, bound_m);
+    model_.closed.insert(model_.closed.end(), ways.begin(), ways.end());
 }
 
 BoundedSimplifier Chain::simplifier(LabelledMesh surface) const {

@@ -1,11 +1,12 @@
 #include "mesh_out/lost_surface_detail.h"
 
+#include <algorithm>
 #include <array>
 #include <cmath>
+#include <optional>
 
 #include <tbb/parallel_for.h>
 
-#include "mesh_out/face_error_detail.h"
 #include "vdb_ops/rasterize.h"
 
 namespace taihu {
@@ -15,9 +16,11 @@ using openvdb::Coord;
 using Leaf = openvdb::FloatTree::LeafNodeType;
 constexpr int kDim = Leaf::DIM;
 constexpr float kNear = 0.8660254f;   ///< voxels: half the diagonal of one
-constexpr float kTowards = 0.5f;      ///< cosine of what still is towards the surface
-constexpr float kNoSlope = 0.3f;      ///< of a voxel a voxel: both sides are equally near
-constexpr double kFarthest_vox = 1.5; ///< that a point may be from where it was looked for
+constexpr float kBent = 0.35f;        ///< voxels, from a straight line through three values
+constexpr float kOffSlope = 0.06f;    ///< of differences, from 1
+constexpr double kNearPart_vox = 0.5; ///< the same of an eighth of a voxel, and some more
+constexpr double kFarthest_vox = 1;   ///< that a point may be from where it was looked for
+constexpr double kOn_vox = 1e-4;      ///< on the surface
 
 /// The values of a leaf and one voxel around it [voxels].
 class Halo {
@@ -31,29 +34,19 @@ public:
                     all_[i++] = in.getValue(origin.offsetBy(x, y, z)) * per_m;
     }
 
-    /// Whether there is a surface near a voxel that no neighbour shows.
-    bool hides_surface(int x, int y, int z) const {
+    /// Whether the surface comes near a voxel where there is more of it than one smooth sheet: of
+    /// that, differences have the length 1 but for the square of its curvature.
+    bool bends(int x, int y, int z) const {
         const float own = at(x, y, z);
         if (!(std::fabs(own) <= kNear))
             return false;
-        const std::array<float, 3> slope = {(at(x + 1, y, z) - at(x - 1, y, z)) / 2,
-                                            (at(x, y + 1, z) - at(x, y - 1, z)) / 2,
-                                            (at(x, y, z + 1) - at(x, y, z - 1)) / 2};
-        const float steep =
-            std::sqrt(slope[0] * slope[0] + slope[1] * slope[1] + slope[2] * slope[2]);
-        const float towards = own < 0 ? 1.f : -1.f; // up the slope from inside
-        for (int i = -1; i <= 1; ++i)
-            for (int j = -1; j <= 1; ++j)
-                for (int k = -1; k <= 1; ++k) {
-                    if ((at(x + i, y + j, z + k) < 0) == (own < 0))
-                        continue;
-                    const float along =
-                        towards * (slope[0] * float(i) + slope[1] * float(j) + slope[2] * float(k));
-                    const float far = std::sqrt(float(i * i + j * j + k * k));
-                    if (steep < kNoSlope || along >= kTowards * far * steep)
-                        return false;
-                }
-        return true;
+        float slope2 = 0, bent = 0;
+        for (const auto& [i, j, k] : {std::array{1, 0, 0}, {0, 1, 0}, {0, 0, 1}}) {
+            const float more = at(x + i, y + j, z + k), less = at(x - i, y - j, z - k);
+            slope2 += (more - less) * (more - less) / 4;
+            bent = std::max(bent, std::fabs(more + less - 2 * own));
+        }
+        return bent > kBent || std::fabs(slope2 - 1) > 2 * kOffSlope;
     }
 
 private:
@@ -64,9 +57,51 @@ private:
     std::array<float, kSide * kSide * kSide> all_{};
 };
 
+/// Looks for the field's surface near points, and keeps what was not extracted.
+class Seeker {
+public:
+    Seeker(const FieldProbe& field, const SurfaceDistance& extracted, double voxel_m,
+           double least_m)
+        : field_(field), extracted_(extracted), voxel_m_(voxel_m), least_m_(least_m) {}
+
+    /// On every primitive near `p`, or where those meet that cut off its nearest point.
+    void seek(const Vec3& p) {
+        if (std::fabs(field_.at(p).value_m) > kNearPart_vox * voxel_m_)
+            return;
+        near_.clear();
+        field_.near(p, kFarthest_vox * voxel_m_, near_);
+        for (const Primitive one : near_)
+            if (const auto y = surface_point(one, p); y && extracted_(*y) > least_m_)
+                found.push_back(*y);
+    }
+    std::vector<Vec3> found;
+
+private:
+    std::optional<Vec3> surface_point(Primitive one, const Vec3& p) const {
+        PrimitiveSet set(one);
+        for (std::size_t i = 0; i < PrimitiveSet::kMost; ++i) {
+            const auto y = onto(field_, set, p, kFarthest_vox * voxel_m_);
+            if (!y)
+                return std::nullopt;
+            const FieldProbe::Nearest there = field_.at(*y);
+            if (std::fabs(there.value_m) <= kOn_vox * voxel_m_)
+                return y;
+            if (!set.add(there.primitive))
+                return std::nullopt;
+        }
+        return std::nullopt;
+    }
+
+    const FieldProbe& field_;
+    const SurfaceDistance& extracted_;
+    double voxel_m_, least_m_;
+    std::vector<Primitive> near_;
+};
+
 } // namespace
 
 std::vector<Vec3> lost_surface(const openvdb::FloatGrid& solid, const FieldProbe& field,
+                               const SurfaceDistance& extracted, double least_m,
                                Progress* progress) {
     const Lattice lattice = lattice_of(solid);
     std::vector<const Leaf*> leaves;
@@ -76,20 +111,21 @@ std::vector<Vec3> lost_surface(const openvdb::FloatGrid& solid, const FieldProbe
         check_cancelled(progress);
         const Coord origin = leaves[n]->origin();
         const Halo halo(solid, origin, static_cast<float>(1 / lattice.voxel_m));
+        Seeker seeker(field, extracted, lattice.voxel_m, least_m);
         for (int x = 0; x < kDim; ++x)
             for (int y = 0; y < kDim; ++y)
                 for (int z = 0; z < kDim; ++z) {
-                    if (!halo.hides_surface(x, y, z))
+                    if (!halo.bends(x, y, z))
                         continue;
-                    const Vec3 at =
-                        lattice.origin + Vec3{double(origin.x() + x), double(origin.y() + y),
-                                              double(origin.z() + z)} *
-                                             lattice.voxel_m;
-                    const double farthest_m = kFarthest_vox * lattice.voxel_m;
-                    if (const auto p = surface_point_near(field, at, farthest_m);
-                        p && length(*p - at) <= farthest_m)
-                        found[n].push_back(*p);
+                    const Vec3 at{double(origin.x() + x), double(origin.y() + y),
+                                  double(origin.z() + z)};
+                    for (int part = 0; part < 8; ++part)
+                        seeker.seek(lattice.origin +
+                                    (at + Vec3{part & 1 ? .25 : -.25, part & 2 ? .25 : -.25,
+                                               part & 4 ? .25 : -.25}) *
+                                        lattice.voxel_m);
                 }
+        found[n] = std::move(seeker.found);
     });
     std::vector<Vec3> all;
     for (const auto& part : found)

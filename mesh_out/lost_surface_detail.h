@@ -3,19 +3,20 @@
 
 #include <openvdb/openvdb.h>
 
+#include "mesh_out/surface_distance.h"
 #include "stats/core/progress.h"
 #include "vdb_ops/field_probe.h"
 
 namespace taihu {
 
-/// Points of the field's surface that its level set does not see: on fins, walls and slits thinner
-/// than a voxel, between whose sides no lattice point lies. Every such surface has a lattice point
-/// within half the diagonal of a voxel, whose value is small though no neighbour towards the
-/// surface has the other sign; from there it is looked for. About one point a voxel; what is partly
-/// seen may be given, too, and has to be measured. The same on any number of threads. O(band).
+/// Points of the field's surface farther than `least_m` from the one extracted of its level set:
+/// on fins, walls and slits thinner than a voxel, and on tips and edges too sharp for it. They are
+/// sought round lattice points near the surface where values bend, half a voxel apart, on every
+/// primitive and rim there. The same on any number of threads. O(band), field evaluations by rims.
 /// \param solid  level set of true distances near its surface. \param field  a probe of all of it
-/// with a reach of 2 voxels.
+/// with a reach of 2 voxels. \param extracted  what the voxels show of that surface.
 std::vector<Vec3> lost_surface(const openvdb::FloatGrid& solid, const FieldProbe& field,
+                               const SurfaceDistance& extracted, double least_m,
                                Progress* progress = nullptr);
 
 } // namespace taihu

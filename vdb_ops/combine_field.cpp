@@ -25,15 +25,27 @@ Cover times(float sign, Cover c) {
     return sign < 0 ? flipped(c) : c;
 }
 
-/// Minimum of the sorted values [first, last) over k, relative to the first.
-double blend_sorted(const double* first, const double* last, double k) {
+/// Weight i of the sorted values [first, last) is (level - u_i) / k before `end`, u_i being the
+/// value above the least, and 0 from there on.
+struct Blend {
+    double level;
+    const double* end;
+};
+Blend blend_of(const double* first, const double* last, double k) {
     const double least = *first;
-    double sum = 0, level = k; // weight i is (level - u_i) / k, u_i = value above the least
+    double sum = 0, level = k;
     const double* end = first;
     for (double n = 1; end != last && *end - least < level; ++n) {
         sum += *end++ - least;
         level = (k + sum) / n;
     }
+    return {level, end};
+}
+
+/// Minimum of the sorted values [first, last) over k, relative to the first.
+double blend_sorted(const double* first, const double* last, double k) {
+    const double least = *first;
+    const auto [level, end] = blend_of(first, last, k);
     if (end - first == 1)
         return least;
     if (end - first == 2) {
@@ -273,6 +285,13 @@ double smooth_min(std::vector<double> values, double k) {
 
 double smooth_min_sorted(std::span<const double> values, double k) {
     return k > 0 ? blend_sorted(values.data(), values.data() + values.size(), k) : values.front();
+}
+
+void smooth_min_weights(std::span<const double> values, double k, std::span<double> weights) {
+    const double* const first = values.data();
+    const auto [level, end] = blend_of(first, first + values.size(), k);
+    for (std::size_t i = 0; i < values.size(); ++i)
+        weights[i] = first + i < end ? (level - (values[i] - values[0])) / k : 0;
 }
 
 } // namespace taihu

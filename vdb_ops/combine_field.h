@@ -53,5 +53,7 @@ private:
 double smooth_min(std::vector<double> values, double k);
 /// Of ascending values, at least one.
 double smooth_min_sorted(std::span<const double> values, double k);
+/// The weights w_i of smooth_min_sorted(), its derivatives; k > 0.
+void smooth_min_weights(std::span<const double> values, double k, std::span<double> weights);
 
 } // namespace taihu

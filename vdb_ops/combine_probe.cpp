@@ -1,6 +1,9 @@
 #include <algorithm>
-#include <array>
 #include <cmath>
+#include <limits>
+#include <span>
+
+#include <boost/container/small_vector.hpp>
 
 #include "vdb_ops/combine_field.h"
 #include "vdb_ops/csg_field.h"
@@ -46,14 +49,29 @@ public:
 
     Value of(Primitive primitive, const Vec3& p) const override {
         if (primitive == own_)
-            return {sign_ * blended_at(p),
-                    gradient_of([this](const Vec3& q) { return sign_ * blended_at(q); }, p,
-                                gradient_step(reach_m_))};
+            return blended_slope(p, gradient_step(reach_m_));
         const Operand& o = owner(primitive);
-        Value v = o.probe->of(primitive - o.first, p);
-        v.value_m *= sign_ * o.sign;
-        v.gradient *= sign_ * o.sign;
-        return v;
+        return times(sign_ * o.sign, o.probe->of(primitive - o.first, p));
+    }
+
+    double value_of(Primitive primitive, const Vec3& p) const override {
+        if (primitive == own_)
+            return sign_ * blended_at(p);
+        const Operand& o = owner(primitive);
+        return sign_ * o.sign * o.probe->value_of(primitive - o.first, p);
+    }
+
+    Value slope(const Vec3& p, double step_m) const override {
+        if (blend_m_ > 0)
+            return blended_slope(p, step_m);
+        const Operand* least = nullptr;
+        double least_m = std::numeric_limits<double>::infinity();
+        for (const Operand& o : operands_)
+            if (const double v = o.sign * o.probe->at(p).value_m; v < least_m) {
+                least = &o;
+                least_m = v;
+            }
+        return times(sign_ * least->sign, least->probe->slope(p, step_m));
     }
 
     void near(const Vec3& p, double reach_m, std::vector<Primitive>& out) const override {
@@ -75,6 +93,11 @@ public:
     }
 
 private:
+    static Value times(double sign, Value v) {
+        v.value_m *= sign;
+        v.gradient *= sign;
+        return v;
+    }
     const Operand& owner(Primitive primitive) const {
         return *(std::upper_bound(operands_.begin(), operands_.end(), primitive,
                                   [](Primitive p, const Operand& o) { return p < o.first; }) -
@@ -82,20 +105,32 @@ private:
     }
     /// The least of the operands' values, blended.
     double blended_at(const Vec3& p) const {
-        constexpr std::size_t kFew = 8;
-        if (operands_.size() > kFew) {
-            std::vector<double> values;
-            for (const Operand& o : operands_)
-                values.push_back(o.sign * o.probe->at(p).value_m);
-            return smooth_min(std::move(values), blend_m_);
-        }
-        std::array<double, kFew> values;
-        for (std::size_t i = 0; i < operands_.size(); ++i)
-            values[i] = operands_[i].sign * operands_[i].probe->at(p).value_m;
-        std::sort(values.begin(), values.begin() + static_cast<std::ptrdiff_t>(operands_.size()));
-        return smooth_min_sorted({values.data(), operands_.size()}, blend_m_);
+        boost::container::small_vector<double, kFew> values;
+        for (const Operand& o : operands_)
+            values.push_back(o.sign * o.probe->at(p).value_m);
+        std::sort(values.begin(), values.end());
+        return smooth_min_sorted({values.data(), values.size()}, blend_m_);
+    }
+    /// sign * blended_at(), by the chain rule.
+    Value blended_slope(const Vec3& p, double step_m) const {
+        boost::container::small_vector<std::pair<double, const Operand*>, kFew> order;
+        for (const Operand& o : operands_)
+            order.push_back({o.sign * o.probe->at(p).value_m, &o});
+        std::stable_sort(order.begin(), order.end(),
+                         [](const auto& a, const auto& b) { return a.first < b.first; });
+        boost::container::small_vector<double, kFew> values, weights(order.size());
+        for (const auto& [value, o] : order)
+            values.push_back(value);
+        const std::span<const double> sorted{values.data(), values.size()};
+        smooth_min_weights(sorted, blend_m_, {weights.data(), weights.size()});
+        Value blended{sign_ * smooth_min_sorted(sorted, blend_m_), {}};
+        for (std::size_t i = 0; i < order.size() && weights[i] > 0; ++i)
+            blended.gradient += order[i].second->probe->slope(p, step_m).gradient *
+                                (sign_ * order[i].second->sign * weights[i]);
+        return blended;
     }
 
+    static constexpr std::size_t kFew = 8;
     double sign_, blend_m_, reach_m_;
     std::vector<Operand> operands_;
     Primitive own_;

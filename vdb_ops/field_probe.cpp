@@ -3,7 +3,14 @@
 #include <algorithm>
 #include <cmath>
 
+#include "vdb_ops/probe_detail.h"
+
 namespace taihu {
+
+FieldProbe::Value FieldProbe::slope(const Vec3& p, double step_m) const {
+    const auto value = [this](const Vec3& q) { return at(q).value_m; };
+    return {value(p), gradient_of(value, p, step_m)};
+}
 
 bool PrimitiveSet::has(Primitive p) const {
     return std::find(ids_.begin(), ids_.begin() + static_cast<std::ptrdiff_t>(size_), p) !=

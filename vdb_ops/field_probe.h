@@ -61,6 +61,14 @@ public:
     /// One primitive, anywhere. Where at() decides for it on the surface both are 0; off the
     /// surface they may differ, as past the edge of a box.
     virtual Value of(Primitive primitive, const Vec3& p) const = 0;
+    /// The value of of() alone.
+    virtual double value_of(Primitive primitive, const Vec3& p) const {
+        return of(primitive, p).value_m;
+    }
+    /// What at() gives, and its own gradient: here by differences over `step_m`, by which the box
+    /// of the probe has to reach farther. Fields of fields hand the question on: differences of
+    /// differences would take six times as long at every depth.
+    virtual Value slope(const Vec3& p, double step_m) const;
     /// Appends the primitives whose surface may come within `reach_m` of `p`, at most that of the
     /// probe, where the solid's surface may be theirs; ascending, each once.
     virtual void near(const Vec3& p, double reach_m, std::vector<Primitive>& out) const = 0;

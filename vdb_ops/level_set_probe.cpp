@@ -31,6 +31,7 @@ public:
 
     Nearest at(const Vec3& p) const override { return {sample(p).value_m, 0}; }
     Value of(Primitive, const Vec3& p) const override { return sample(p); }
+    Value slope(const Vec3& p, double) const override { return sample(p); }
     void near(const Vec3&, double, std::vector<Primitive>& out) const override { out.push_back(0); }
     std::optional<Sphere> ball(Primitive) const override { return std::nullopt; }
 

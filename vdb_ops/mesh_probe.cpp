@@ -220,7 +220,8 @@ class MeshProbe final : public FieldProbe {
 public:
     MeshProbe(const ClosedMesh& mesh, const std::vector<std::uint32_t>& part, const Box& region,
               double reach_m)
-        : mesh_(mesh), part_(part), reach_m_(reach_m), cube_(region, std::min(4 * reach_m, region.longest() / 64), kMostDepth),
+        : mesh_(mesh), part_(part), reach_m_(reach_m),
+          cube_(region, std::min(4 * reach_m, region.longest() / 64), kMostDepth),
           columns_(mesh, in_cells(), cells()) {
         std::vector<std::vector<std::uint32_t>> faces(mesh.shells.size());
         // Ways to middles of cells reach beyond the region by a cell.

@@ -20,26 +20,25 @@ public:
         const double v = sign_ * (d.value_m - by_m_);
         const bool far = std::fabs(v) >= reach_m_;
         if (!far && by_m_ != 0 &&
-            std::fabs(of_->of(d.primitive, p).value_m - d.value_m) > 1e-6 * reach_m_)
+            std::fabs(of_->value_of(d.primitive, p) - d.value_m) > 1e-6 * reach_m_)
             return {v, own_};
         return {v, d.primitive};
     }
     Value of(Primitive primitive, const Vec3& p) const override {
-        if (primitive == own_) {
-            const auto value = [this](const Vec3& q) {
-                return sign_ * (of_->at(q).value_m - by_m_);
-            };
-            return {value(p), gradient_of(value, p, gradient_step(reach_m_))};
-        }
-        Value v = of_->of(primitive, p);
-        v.value_m = sign_ * (v.value_m - by_m_);
-        v.gradient *= sign_;
-        return v;
+        return shifted(primitive == own_ ? of_->slope(p, gradient_step(reach_m_))
+                                         : of_->of(primitive, p));
+    }
+    double value_of(Primitive primitive, const Vec3& p) const override {
+        return sign_ *
+               ((primitive == own_ ? of_->at(p).value_m : of_->value_of(primitive, p)) - by_m_);
+    }
+    Value slope(const Vec3& p, double step_m) const override {
+        return shifted(of_->slope(p, step_m));
     }
     void near(const Vec3& p, double reach_m, std::vector<Primitive>& out) const override {
         const std::size_t begin = out.size();
         of_->near(p, reach_m + std::fabs(by_m_), out);
-        const auto far = [&](Primitive i) { return std::fabs(of(i, p).value_m) > reach_m; };
+        const auto far = [&](Primitive i) { return std::fabs(value_of(i, p)) > reach_m; };
         out.erase(std::remove_if(out.begin() + static_cast<std::ptrdiff_t>(begin), out.end(), far),
                   out.end());
         if (by_m_ != 0 && std::fabs(at(p).value_m) <= reach_m)
@@ -58,6 +57,12 @@ public:
     }
 
 private:
+    Value shifted(Value v) const {
+        v.value_m = sign_ * (v.value_m - by_m_);
+        v.gradient *= sign_;
+        return v;
+    }
+
     std::unique_ptr<FieldProbe> of_;
     Primitive own_;
     double sign_, by_m_, reach_m_;
@@ -83,6 +88,12 @@ public:
     }
     Value of(Primitive i, const Vec3& p) const override {
         return i < n_outer_ ? outer_->of(i, p) : inner_->of(i - n_outer_, p);
+    }
+    double value_of(Primitive i, const Vec3& p) const override {
+        return i < n_outer_ ? outer_->value_of(i, p) : inner_->value_of(i - n_outer_, p);
+    }
+    Value slope(const Vec3& p, double step_m) const override {
+        return (outer_->at(p).value_m >= inner_->at(p).value_m ? outer_ : inner_)->slope(p, step_m);
     }
     void near(const Vec3& p, double reach_m, std::vector<Primitive>& out) const override {
         outer_->near(p, reach_m, out);

@@ -135,7 +135,8 @@ TAIHU_INLINE void distances(const VoxelSolid& s, const double* x, const double* 
     std::copy(y, y + kLanes, d);
 }
 
-/// The points at `first` [voxels] and 7 times `step` along z, in the solid's own frame.
+/// The points at `first` [voxels], then `step` apart along z, in the solid's own frame.
+template <int kLanes>
 TAIHU_INLINE void make_row(const VoxelSolid& s, const double* first, double step, double* x,
                            double* y, double* z) {
     const double q[3] = {first[0] - s.center[0], first[1] - s.center[1], first[2] - s.center[2]};
@@ -143,7 +144,7 @@ TAIHU_INLINE void make_row(const VoxelSolid& s, const double* first, double step
     for (int k = 0; k < 3; ++k) {
         const double* t = s.turn[k];
         const double begin = t[0] * q[0] + t[1] * q[1] + t[2] * q[2], by = t[2] * step;
-        for (int i = 0; i < kRow; ++i)
+        for (int i = 0; i < kLanes; ++i)
             to[k][i] = begin + by * i;
     }
 }
@@ -169,8 +170,15 @@ TAIHU_INLINE void flush(const VoxelSolid& solid, Batch& batch) {
 TAIHU_CLONES
 void solid_row(const VoxelSolid& solid, const double* first, double step, double* out) {
     double x[kRow], y[kRow], z[kRow];
-    make_row(solid, first, step, x, y, z);
+    make_row<kRow>(solid, first, step, x, y, z);
     distances<kRow>(solid, x, y, z, out);
+}
+
+double solid_distance(const VoxelSolid& solid, const double* point) {
+    double x, y, z, d;
+    make_row<1>(solid, point, 0, &x, &y, &z);
+    distances<1>(solid, &x, &y, &z, &d);
+    return d;
 }
 
 TAIHU_CLONES
@@ -199,7 +207,7 @@ void min_solid(const VoxelSolid& solid, const int* leaf, double half_width, floa
             const double first[3] = {leaf[0] + double(i), leaf[1] + double(j), double(leaf[2])};
             double *x = batch.x + batch.n * kRow, *y = batch.y + batch.n * kRow,
                    *z = batch.z + batch.n * kRow;
-            make_row(solid, first, 1, x, y, z);
+            make_row<kRow>(solid, first, 1, x, y, z);
             double nearest = 0;
             for (int k = 0; k < kRow && is_ellipsoid; ++k) {
                 const double level = x[k] * x[k] * inverse2[0] + y[k] * y[k] * inverse2[1] +

@@ -31,6 +31,9 @@ struct VoxelSolid {
 /// The distances [voxels] at 8 points along z: `first`, then `step` apart.
 void solid_row(const VoxelSolid& solid, const double* first, double step, double* distances);
 
+/// The distance [voxels] at one point: as in a row of step 0.
+double solid_distance(const VoxelSolid& solid, const double* point);
+
 /// values[512] = min(values, distances) for the voxels of a leaf, whose first one is `leaf`; rows
 /// farther than `half_width` from the solid's box are left alone.
 void min_solid(const VoxelSolid& solid, const int* leaf, double half_width, float* values);

@@ -117,10 +117,8 @@ Box bounds(const AnalyticSolid& solid) {
 }
 
 double distance_m(const AnalyticSolid& solid, const Vec3& p) {
-    double d[8];
-    const double first[3] = {p.x, p.y, p.z};
-    solid_row(VoxelSolid(solid, {1, {}, 3}), first, 0, d);
-    return d[0];
+    const double point[3] = {p.x, p.y, p.z};
+    return solid_distance(VoxelSolid(solid, {1, {}, 3}), point);
 }
 
 VoxelSolid::VoxelSolid(const AnalyticSolid& solid, const Lattice& lattice) {

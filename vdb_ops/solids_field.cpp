@@ -30,11 +30,9 @@ Cover cover_of(double middle, double size, double half_width) {
 }
 
 Cover cover_of(const VoxelSolid& solid, const Coord& cube, double size, double half_width) {
-    double d[8];
     const double half = 0.5 * (size - 1);
     const double middle[3] = {cube.x() + half, cube.y() + half, cube.z() + half};
-    solid_row(solid, middle, 0, d);
-    return cover_of(d[0], size, half_width);
+    return cover_of(solid_distance(solid, middle), size, half_width);
 }
 
 class SolidsBlock final : public BlockSampler {

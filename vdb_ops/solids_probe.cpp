@@ -79,10 +79,8 @@ public:
 
     const VoxelSolid& solid() const { return s_; }
     double distance(const Vec3& p) const {
-        double d[8];
-        const double first[3] = {p.x, p.y, p.z};
-        solid_row(s_, first, 0, d);
-        return d[0];
+        const double point[3] = {p.x, p.y, p.z};
+        return solid_distance(s_, point);
     }
 
     /// The face that decides at a point.
@@ -99,14 +97,19 @@ public:
         return best;
     }
 
-    Value of(Primitive face, const Vec3& p) const {
-        const Vec3 q = local(p);
-        Value v = face_value(face, q);
-        Vec3 world;
-        for (int k = 0; k < 3; ++k)
-            world += Vec3{s_.turn[k][0], s_.turn[k][1], s_.turn[k][2]} * v.gradient[k];
-        v.gradient = world;
-        return v;
+    Value of(Primitive face, const Vec3& p) const { return turned(face_value(face, local(p))); }
+    /// The distance and its gradient, past edges, too.
+    Value slope(const Vec3& p, double step_m) const {
+        const double* a = s_.size;
+        if (s_.kind == Kind::box)
+            return turned(box_value(local(p), {a[0], a[1], a[2]}, s_.round));
+        if (s_.kind == Kind::cylinder)
+            return turned(round_cylinder_value(local(p)));
+        if (s_.kind == Kind::cone) {
+            const auto value = [this](const Vec3& q) { return distance(q); };
+            return {value(p), gradient_of(value, p, step_m)};
+        }
+        return of(0, p);
     }
 
     std::optional<Sphere> ball() const {
@@ -123,6 +126,21 @@ private:
         for (int k = 0; k < 3; ++k)
             out[k] = s_.turn[k][0] * q.x + s_.turn[k][1] * q.y + s_.turn[k][2] * q.z;
         return out;
+    }
+
+    Value turned(Value v) const {
+        Vec3 world;
+        for (int k = 0; k < 3; ++k)
+            world += Vec3{s_.turn[k][0], s_.turn[k][1], s_.turn[k][2]} * v.gradient[k];
+        v.gradient = world;
+        return v;
+    }
+    /// A rounded rectangle, turned about the axis.
+    Value round_cylinder_value(const Vec3& q) const {
+        const double rho = std::hypot(q.x, q.z);
+        const Value v = box_value({rho, q.y, 0}, {s_.size[0], s_.size[1], 1}, s_.round);
+        const Vec3 out = outwards(q) * v.gradient.x;
+        return {v.value_m, {out.x, v.gradient.y, out.z}};
     }
 
     Value face_value(Primitive face, const Vec3& q) const {
@@ -143,13 +161,10 @@ private:
             return {sign * q[axis] - a[axis], along(axis, sign)};
         }
         case Kind::cylinder: {
-            const double rho = std::hypot(q.x, q.z);
-            if (s_.round > 0) { // a rounded rectangle, turned about the axis
-                const Value v = box_value({rho, q.y, 0}, {a[0], a[1], 1}, s_.round);
-                const Vec3 out = outwards(q) * v.gradient.x;
-                return {v.value_m, {out.x, v.gradient.y, out.z}};
-            }
-            return face == 0 ? Value{rho - a[0], outwards(q)} : cap_value(q, a[1], face == 1);
+            if (s_.round > 0)
+                return round_cylinder_value(q);
+            return face == 0 ? Value{std::hypot(q.x, q.z) - a[0], outwards(q)}
+                             : cap_value(q, a[1], face == 1);
         }
         case Kind::cone:
             return face == 0 ? slant_value(q, a) : cap_value(q, a[2], face == 1);
@@ -253,17 +268,12 @@ public:
           cells_(solids_, region, reach_m) {}
 
     Nearest at(const Vec3& p) const override {
-        const std::size_t cell = cells_.cell(p);
-        if (cells_.inside(cell))
-            return {-reach_m_, 0};
-        double least = reach_m_;
-        const std::uint32_t* best = nullptr;
-        for (const std::uint32_t& i : cells_.near(cell))
-            if (const double d = solids_[i].distance(p); d < least) {
-                least = d;
-                best = &i;
-            }
+        const auto [least, best] = nearest(p);
         return {least, best ? first_[*best] + solids_[*best].face(p) : 0};
+    }
+    Value slope(const Vec3& p, double step_m) const override {
+        const auto [least, best] = nearest(p);
+        return best ? solids_[*best].slope(p, step_m) : Value{least, {}};
     }
     Value of(Primitive primitive, const Vec3& p) const override {
         const std::size_t i = owner(primitive);
@@ -281,6 +291,17 @@ public:
     }
 
 private:
+    /// The distance, as far as the probe reaches, and the solid it is of.
+    std::pair<double, const std::uint32_t*> nearest(const Vec3& p) const {
+        const std::size_t cell = cells_.cell(p);
+        if (cells_.inside(cell))
+            return {-reach_m_, nullptr};
+        std::pair<double, const std::uint32_t*> best{reach_m_, nullptr};
+        for (const std::uint32_t& i : cells_.near(cell))
+            if (const double d = solids_[i].distance(p); d < best.first)
+                best = {d, &i};
+        return best;
+    }
     std::size_t owner(Primitive primitive) const {
         return static_cast<std::size_t>(std::upper_bound(first_.begin(), first_.end(), primitive) -
                                         first_.begin() - 1);

@@ -5,7 +5,9 @@
 
 #include <gtest/gtest.h>
 
+#include "mesh_out/extract.h"
 #include "vdb_ops/balls_field.h"
+#include "vdb_ops/combine_field.h"
 #include "vdb_ops/csg_field.h"
 #include "vdb_ops/rasterize.h"
 
@@ -21,7 +23,8 @@ std::shared_ptr<const Field> balls(Balls of) {
 std::vector<Vec3> lost(const Field& field) {
     const auto grid = rasterize(field, Lattice{1, {}, 3});
     const auto probe = field.probe({{-60, -60, -60}, {60, 60, 60}}, 2);
-    return lost_surface(*grid, *probe);
+    const LabelledMesh seen = extract(*grid, &field, {.bound_vox = 0.25});
+    return lost_surface(*grid, *probe, SurfaceDistance({seen.positions, seen.triangles, {}}), 0.2);
 }
 
 TEST(LostSurface, NothingIsLostWhereVoxelsSeeAll) {
@@ -42,15 +45,28 @@ TEST(LostSurface, FindsAWallBetweenTwoLayersOfVoxels) {
         EXPECT_NEAR(probe->at(p).value_m, 0, 1e-4); // of a voxel: to what projections go
         n_middle += std::hypot(p.y, p.z) < 3 && p.x > 0.3 && p.x < 0.7;
     }
-    EXPECT_GT(n_middle, 14u); // 28 lattice points lie on either side of that disc
-    // Every point of that disc has one within a voxel.
+    EXPECT_GT(n_middle, 112u); // half of 8 about each of the 28 lattice points of that disc
+    // Every point of that disc has one within half a voxel.
     for (double y = -2; y <= 2; y += 0.5)
         for (double z = -2; z <= 2; z += 0.5) {
             double least = 9;
             for (const Vec3& p : points)
                 least = std::min(least, length(p - Vec3{0.35, y, z}));
-            EXPECT_LT(least, 1);
+            EXPECT_LT(least, 0.5);
         }
+}
+
+TEST(LostSurface, FindsTheEdgeOfAWedgeBeyondTheLastVoxel) {
+    // What two balls of radius 30 have in common, 4 voxels thick, is a lens whose rim is sharp: the
+    // extracted surface ends where voxels do, or runs along the rim.
+    const auto field = std::make_shared<CombineField>(
+        Combine::intersect, std::vector<std::shared_ptr<const Field>>{
+                                balls({{{-28.1, 0.3, 0.2}, 30}}), balls({{{28.1, 0.3, 0.2}, 30}})});
+    const double rim = std::sqrt(30 * 30 - 28.1 * 28.1);
+    for (const Vec3& p : lost(*field)) {
+        EXPECT_NEAR(std::hypot(p.y - 0.3, p.z - 0.2), rim, 1.5); // nowhere but near the rim
+        EXPECT_NEAR(field->probe({{-60, -60, -60}, {60, 60, 60}}, 2)->at(p).value_m, 0, 1e-4);
+    }
 }
 
 TEST(LostSurface, FindsABallBetweenVoxels) {

@@ -108,6 +108,28 @@ TEST(SmoothMin, IsSymmetricLipschitzAndSharpWhereOthersAreFar) {
     EXPECT_EQ(smooth_min({5}, 1), 5);
 }
 
+TEST(SmoothMin, HasItsWeightsAsDerivatives) {
+    for (std::uint64_t i = 0; i < 100; ++i) {
+        std::vector<double> v;
+        for (std::uint32_t j = 0; j < 4; ++j)
+            v.push_back(random_number(i, j));
+        std::sort(v.begin(), v.end());
+        const double k = 0.05 + random_number(i, 7), step = 1e-6;
+        std::vector<double> weights(v.size());
+        smooth_min_weights(v, k, weights);
+        double sum = 0;
+        for (std::size_t j = 0; j < v.size(); ++j) {
+            std::vector<double> more = v, less = v;
+            more[j] += step;
+            less[j] -= step;
+            const double slope = (smooth_min(more, k) - smooth_min(less, k)) / (2 * step);
+            EXPECT_NEAR(weights[j], slope, 2 * step / k); // weights are 1 / k steep
+            sum += weights[j];
+        }
+        EXPECT_NEAR(sum, 1, 1e-14);
+    }
+}
+
 TEST(CombineField, IsTheClampedValueAtEveryVoxel) {
     for (const Combine how : kAll)
         for (const double k : {0.0, 0.05, 0.5}) { // below a voxel, and wider than the band

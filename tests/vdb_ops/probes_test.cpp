@@ -42,7 +42,7 @@ void expect_probe(const Field& field, double tolerance_vox, double band_vox = 3,
     const auto grid = rasterize(field, kLattice);
     const Box box = level_set_box(*grid).dilated(2 * kVoxel);
     const auto probe = field.probe(box, kReach);
-    std::size_t n = 0, n_faces = 0, n_missed = 0, n_outside = 0;
+    std::size_t n = 0, n_faces = 0, n_missed = 0, n_bent = 0, n_outside = 0;
     double worst = 0, worst_slope = 0;
     for (auto it = grid->cbeginValueOn(); it; ++it) {
         const auto c = it.getCoord();
@@ -53,6 +53,19 @@ void expect_probe(const Field& field, double tolerance_vox, double band_vox = 3,
         n_outside += at.primitive >= field.n_primitives();
         if (++n % 7 != 0)
             continue;
+        EXPECT_EQ(probe->value_of(at.primitive, p), probe->of(at.primitive, p).value_m);
+        const double step = 1e-4 * kReach;
+        const FieldProbe::Value own = probe->slope(p, step);
+        EXPECT_NEAR(own.value_m, at.value_m, 1e-6 * kReach); // faces say it in other words
+        bool bends = false; // between the nearest points of two parts, and at edges
+        for (int axis = 0; axis < 3; ++axis) {
+            Vec3 by;
+            by[axis] = step;
+            const double slope =
+                (probe->at(p + by).value_m - probe->at(p - by).value_m) / (2 * step);
+            bends = bends || std::fabs(slope - own.gradient[axis]) > 0.02;
+        }
+        n_bent += bends;
         // A point of the surface near p, if p's primitive leads to one.
         const auto on = onto(*probe, PrimitiveSet(at.primitive), p, kReach);
         if (!on || !box.contains(*on))
@@ -63,7 +76,6 @@ void expect_probe(const Field& field, double tolerance_vox, double band_vox = 3,
         ++n_faces;
         const FieldProbe::Value v = probe->of(there.primitive, *on);
         EXPECT_NEAR(v.value_m, 0, 2e-5 * kReach);
-        const double step = 1e-4 * kReach;
         for (int axis = 0; axis < 3; ++axis) {
             Vec3 by;
             by[axis] = step;
@@ -86,6 +98,7 @@ void expect_probe(const Field& field, double tolerance_vox, double band_vox = 3,
     EXPECT_GT(n_faces, n / 20);
     EXPECT_LE(worst, tolerance_vox * kVoxel);
     if (smooth) {
+        EXPECT_LE(n_bent, n / 7 / 20); // few points lie there
         EXPECT_LE(worst_slope, 0.02); // some parts bend at single places: edges of rounded boxes
     }
     EXPECT_EQ(n_missed, 0u);

@@ -3,9 +3,11 @@
 // The plain version of the kernels under other names, beside the dispatched one.
 #undef TAIHU_CLONES
 #define TAIHU_CLONES
+#define solid_distance plain_solid_distance
 #define solid_row plain_solid_row
 #define min_solid plain_min_solid
 #include "vdb_ops/solid_kernels.cpp" // NOLINT(bugprone-suspicious-include)
+#undef solid_distance
 #undef solid_row
 #undef min_solid
 
@@ -13,6 +15,7 @@
 
 namespace taihu {
 
+double solid_distance(const VoxelSolid& solid, const double* point);
 void solid_row(const VoxelSolid& solid, const double* first, double step, double* out);
 void min_solid(const VoxelSolid& solid, const int* leaf, double half_width, float* values);
 
@@ -41,6 +44,8 @@ TEST(SolidKernels, EveryInstructionSetGivesTheSameBits) {
         plain_solid_row(solid, first, 5, c.data());
         solid_row(solid, first, 5, d.data());
         ASSERT_EQ(c, d);
+        solid_row(solid, first, 0, d.data());
+        ASSERT_EQ(solid_distance(solid, first), d[0]);
     }
 }
 
