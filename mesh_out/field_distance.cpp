@@ -20,7 +20,7 @@ namespace {
 constexpr double kOn = 1e-3;        ///< of the spacing: on the surface
 constexpr double kFarthest = 8;     ///< spacings that a projection may take
 constexpr std::size_t kChunk = 512; ///< faces or points that are summed together
-constexpr double kClose = 0.8;      ///< of the limit: looked at more closely
+constexpr double kClose = 0.65;     ///< of the limit: looked at more closely
 constexpr int kFinest = 64;         ///< parts of an edge
 
 /// The nearest point of the surface that can be reached by projecting onto the primitive that
