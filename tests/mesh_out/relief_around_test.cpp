@@ -15,8 +15,8 @@ namespace taihu {
 namespace {
 
 constexpr double kPi = std::numbers::pi;
-constexpr ReliefMap kMaps[] = {ReliefMap::sphere, ReliefMap::cube, ReliefMap::cylinder,
-                               ReliefMap::triplanar};
+constexpr ReliefMap kMaps[] = {ReliefMap::planar, ReliefMap::sphere, ReliefMap::cube,
+                               ReliefMap::cylinder, ReliefMap::triplanar};
 const Box kFrame{{-1, -1, -1}, {1, 1, 1}};
 
 /// height(column, row) of a tile.
