@@ -37,7 +37,8 @@ std::set<std::string> rows_to_make() {
 TEST(Gallery, ListsEveryRowOnce) {
     const Scratch scratch;
     std::set<std::string> rows;
-    for (const json& row : result("taihu gallery --list", scratch)["rows"]) {
+    const json list = result("taihu gallery --list", scratch);
+    for (const json& row : list["rows"]) {
         EXPECT_TRUE(rows.insert(row["row"]).second) << row;
         EXPECT_NE(row["title"], "");
         // Rows without commands hold times, which a page does not take.
