@@ -1,6 +1,7 @@
 // taihu gallery: every figure, plate and table of the three source texts, made again.
 #include <algorithm>
 #include <chrono>
+#include <set>
 
 #include <unistd.h>
 
@@ -132,11 +133,8 @@ void check_output(const fs::path& out, const Console& console) {
                                               "the gallery");
 }
 
-/// Runs an entry's commands in a folder of its own, which is left with the pictures and with what
-/// the commands read.
-MadeEntry make_entry(GalleryEntry entry, const fs::path& folder, Progress* progress) {
-    fs::create_directory(folder);
-    const CurrentFolder inside(folder);
+/// Runs an entry's commands in the current folder. Returns it with its figures.
+MadeEntry run_entry(GalleryEntry entry, Progress* progress) {
     for (const auto& [name, bytes] : entry.files)
         write_file(name, bytes);
     std::vector<nlohmann::ordered_json> results;
@@ -153,22 +151,31 @@ MadeEntry make_entry(GalleryEntry entry, const fs::path& folder, Progress* progr
             for (std::string& cell : row)
                 cell = filled_cell(cell, results);
     std::vector<std::pair<int, int>> sizes;
-    std::vector<std::string> kept;
     for (const GalleryPicture& p : entry.pictures) {
         const Image picture = read_png(p.file);
         sizes.emplace_back(picture.width, picture.height);
-        kept.push_back(p.file);
     }
-    for (const auto& [name, bytes] : entry.files)
-        kept.push_back(name);
-    std::vector<fs::path> files;
-    for (const auto& file : fs::recursive_directory_iterator("."))
-        if (!file.is_directory())
-            files.push_back(file.path().lexically_normal());
-    for (const fs::path& file : files)
-        if (std::find(kept.begin(), kept.end(), file.string()) == kept.end())
-            fs::remove(file);
     return {std::move(entry), std::move(sizes)};
+}
+
+/// An entry with its pictures, and what its commands read, in a folder of the row's name.
+MadeEntry make_entry(const GalleryEntry& entry, const fs::path& gallery, Progress* progress) {
+    const fs::path folder = gallery / entry.row;
+    const WorkFolder work(folder);
+    MadeEntry made = [&] {
+        const CurrentFolder inside(work.path());
+        return run_entry(entry, progress);
+    }();
+    std::set<fs::path> kept; // a picture may be shown twice
+    for (const GalleryPicture& p : entry.pictures)
+        kept.insert(p.file);
+    for (const auto& [name, bytes] : entry.files)
+        kept.insert(name);
+    for (const fs::path& file : kept) {
+        fs::create_directories((folder / file).parent_path());
+        fs::rename(work.path() / file, folder / file);
+    }
+    return made;
 }
 
 /// All of it takes the place of an earlier gallery in two renames.
@@ -201,8 +208,7 @@ void run(const GalleryArgs& args, const Console& console) {
             const auto begin = std::chrono::steady_clock::now();
             report_stage(console.progress, entry.row + " " + entry.title);
             try {
-                made.back().entries.push_back(
-                    make_entry(entry, work.path() / entry.row, console.progress));
+                made.back().entries.push_back(make_entry(entry, work.path(), console.progress));
             } catch (const Error& e) {
                 throw Error(e.fault(), "gallery: " + entry.row + ": " + e.what());
             }

@@ -36,13 +36,14 @@ padding:1.25rem 1.4rem;margin:1.5rem 0;overflow:hidden}
 .row{font-weight:600;color:var(--mark);font-variant-numeric:tabular-nums}
 .figure{color:var(--soft);font-size:.9rem}
 .look{margin:.35rem 0 1rem;max-width:52rem}
-.pictures{display:grid;grid-template-columns:repeat(auto-fill,minmax(min(100%,15rem),1fr));
+.pictures{display:grid;grid-template-columns:repeat(auto-fill,minmax(min(100%,16rem),1fr));
 gap:1rem}
-.few{grid-template-columns:repeat(auto-fit,minmax(min(100%,15rem),24rem))}
 figure{margin:0}
-img{display:block;max-width:100%;height:auto;border-radius:.3rem;margin:0 auto}
-img.enlarged{width:100%;image-rendering:pixelated}
-.shown{background:#eceae4;border-radius:.3rem;min-height:4rem;display:grid;align-items:center}
+img{display:block;width:100%;height:auto;border-radius:.3rem}
+img.small{width:auto;margin:0 auto}
+img.enlarged{image-rendering:pixelated}
+@media(min-width:42rem){.large{grid-column:span 2}}
+.shown{min-height:6rem;display:grid;align-items:center}
 figcaption{color:var(--soft);font-size:.87rem;margin-top:.4rem}
 .numbers{display:flex;flex-wrap:wrap;gap:1.5rem;align-items:flex-start;margin-top:1rem}
 .scroll{overflow-x:auto;max-width:100%}
@@ -113,16 +114,18 @@ Axis axis_of(const std::vector<double>& values, double from_px, double to_px, bo
     return axis;
 }
 
-std::string curve_svg(const Curve& curve, const Axis& x, const Axis& y, const char* ink) {
+/// \param beneath  broad and pale, so that a curve on it leaves it to be seen.
+std::string curve_svg(const Curve& curve, const Axis& x, const Axis& y, const char* ink,
+                      bool beneath) {
     std::string line, dots;
     for (const auto& [a, b] : curve) {
         line += fmt::format("{}{:.1f},{:.1f}", line.empty() ? "" : " ", x.px(a), y.px(b));
-        dots += fmt::format("<circle cx=\"{:.1f}\" cy=\"{:.1f}\" r=\"2.6\" fill=\"{}\"/>", x.px(a),
-                            y.px(b), ink);
+        dots += fmt::format("<circle cx=\"{:.1f}\" cy=\"{:.1f}\" r=\"{}\"/>", x.px(a), y.px(b),
+                            beneath ? 5 : 2.6);
     }
-    return fmt::format("<polyline points=\"{}\" fill=\"none\" stroke=\"{}\" stroke-width=\"1.6\"/>",
-                       line, ink) +
-           dots;
+    return fmt::format("<g fill=\"{0}\" opacity=\"{1}\"><polyline points=\"{2}\" fill=\"none\" "
+                       "stroke=\"{0}\" stroke-width=\"{3}\"/>{4}</g>",
+                       ink, beneath ? 0.45 : 1, line, beneath ? 5 : 1.6, dots);
 }
 
 /// The curves of a table's chart; cells that are no numbers are left out.
@@ -156,7 +159,7 @@ std::string chart_svg(const GalleryTable& table) {
     double key_x = kLeft;
     for (std::size_t k = 0; k < curves.size(); ++k) {
         const char* ink = kInks[k % std::size(kInks)];
-        svg += curve_svg(curves[k], x, y, ink);
+        svg += curve_svg(curves[k], x, y, ink, k == 0 && curves.size() > 1);
         const std::string& name = table.columns[chart.y[k]];
         svg += fmt::format("<text x=\"{:.0f}\" y=\"242\" fill=\"{}\">{}</text>", key_x, ink,
                            html(name));
@@ -166,6 +169,8 @@ std::string chart_svg(const GalleryTable& table) {
 }
 
 // --- Entries
+
+constexpr int kSmallPx = 120, kLargePx = 480; // widths of what is shown as it is, and wider
 
 std::string table_html(const GalleryTable& table) {
     std::string out = "<div class=\"scroll\"><table><tr>";
@@ -184,10 +189,12 @@ std::string table_html(const GalleryTable& table) {
 std::string picture_html(const MadeEntry& made, std::size_t i) {
     const GalleryPicture& p = made.entry.pictures[i];
     const auto [width, height] = made.sizes[i];
-    return fmt::format("<figure><div class=\"shown\"><img src=\"{}/{}\" width=\"{}\" height=\"{}\" "
-                       "alt=\"{}\" loading=\"lazy\"{}></div><figcaption>{}</figcaption></figure>\n",
-                       html(made.entry.row), html(p.file), width, height, html(p.caption),
-                       p.enlarged ? " class=\"enlarged\"" : "", html(p.caption));
+    const char* kind = p.enlarged ? "enlarged" : width < kSmallPx ? "small" : "full";
+    return fmt::format("<figure class=\"{}\"><div class=\"shown\"><img class=\"{}\" src=\"{}/{}\" "
+                       "width=\"{}\" height=\"{}\" alt=\"{}\" loading=\"lazy\"></div>"
+                       "<figcaption>{}</figcaption></figure>\n",
+                       width > kLargePx ? "large" : "one", kind, html(made.entry.row), html(p.file),
+                       width, height, html(p.caption), html(p.caption));
 }
 
 std::string recipe_html(const GalleryEntry& entry) {
@@ -211,8 +218,7 @@ std::string entry_html(const MadeEntry& made) {
                     "</p>\n",
                     html(e.row), html(e.title), html(e.figure), html(e.look));
     if (!e.pictures.empty()) {
-        out +=
-            e.pictures.size() < 4 ? "<div class=\"pictures few\">\n" : "<div class=\"pictures\">\n";
+        out += "<div class=\"pictures\">\n";
         for (std::size_t i = 0; i < e.pictures.size(); ++i)
             out += picture_html(made, i);
         out += "</div>\n";
@@ -246,12 +252,11 @@ std::string format_gallery(std::span<const MadeText> texts) {
     return fmt::format(
         "<!doctype html>\n<html lang=\"en\"><head><meta charset=\"utf-8\">\n"
         "<meta name=\"viewport\" content=\"width=device-width,initial-scale=1\">\n"
-        "<meta name=\"generator\" content=\"{}\">\n"
+        "{}\n"
         "<title>taihu: the gallery</title>\n<style>{}</style></head>\n<body>\n"
         "<header><h1>The gallery</h1><p>Three texts on stone in computer graphics, made again: "
-        "each "
-        "of their figures, plates and tables by the commands that stand under it, with their "
-        "figures beside today’s.</p></header>\n"
+        "figures, plates and tables by the commands that stand under each, and what was printed "
+        "then beside what comes out now.</p></header>\n"
         "<nav><div>{}</div></nav>\n<main>\n{}</main>\n"
         "<footer>Made by <code>taihu gallery</code>.</footer>\n</body></html>\n",
         kGalleryMark, kStyle, nav, body);

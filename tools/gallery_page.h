@@ -19,7 +19,7 @@ struct MadeText {
 };
 
 /// Tells a page of ours from any other.
-inline constexpr const char* kGalleryMark = "taihu gallery";
+inline constexpr const char* kGalleryMark = "<meta name=\"generator\" content=\"taihu gallery\">";
 
 /// The page: pictures lie in a folder of the row's name beside it. No script, and nothing from
 /// elsewhere.

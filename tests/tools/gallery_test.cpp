@@ -62,7 +62,7 @@ TEST(Gallery, ARowIsAPageWithItsPictureAndItsCommands) {
     EXPECT_EQ(made["rows"], 2);
     EXPECT_EQ(read_png(scratch / "plates/T09/uniform.png").width, 321);
     const std::string page = read_file(scratch / "plates/index.html");
-    EXPECT_THAT(page, HasSubstr("<img src=\"T09/uniform.png\" width=\"321\" height=\"321\""));
+    EXPECT_THAT(page, HasSubstr("src=\"T09/uniform.png\" width=\"321\" height=\"321\""));
     EXPECT_THAT(page, HasSubstr("taihu relief fractal"));
     // Table 4.2: then, and now by the command on the page.
     EXPECT_THAT(page, HasSubstr("<td>exponential</td><td>5.714</td><td>5.714</td>"));
@@ -98,6 +98,14 @@ TEST(Gallery, ReplacesAnEarlierOneAndNothingElse) {
     // Nothing that it worked in is left.
     for (const auto& file : std::filesystem::directory_iterator(scratch.path()))
         EXPECT_THAT(file.path().filename().string(), testing::AnyOf("plates", "mine"));
+}
+
+TEST(Gallery, StoppedItLeavesNothing) {
+    const Scratch scratch; // the row takes some seconds
+    const Finished stopped =
+        run("timeout --preserve-status -s INT 0.5 taihu gallery --only D20", scratch.path());
+    EXPECT_EQ(stopped.exit_code, 130) << stopped.err;
+    EXPECT_TRUE(std::filesystem::is_empty(scratch / "out"));
 }
 
 TEST(Gallery, ARowThatThereIsNotIsOneLineWithARemedy) {
