@@ -124,6 +124,13 @@ TEST(ReliefAround, ATileKeepsItsSizeOnACube) {
     EXPECT_NEAR(length(n - normalized({-1, 0, 1})), 0, 1e-5); // floats
 }
 
+TEST(ReliefAround, PlanarGoesStraightThrough) {
+    const Image ramp = tile(201, [](int x, int) { return 0.01 * (x - 100); });
+    const ReliefAround around(ramp, 0.01, false, ReliefMap::planar, kFrame);
+    for (const Vec3& n : directions()) // the height is x wherever it faces
+        EXPECT_NEAR(around.height_m({0.3, n.y, n.z}, n), 0.3, 1e-6);
+}
+
 TEST(SeedRow, T16BumpsLeaveTheSilhouetteAndDisplacementDoesNot) {
     TriMesh ball = shape_mesh({.kind = ShapeKind::sphere, .size_m = {2, 2, 2}, .subdivisions = 5});
     ball.normals.clear();
