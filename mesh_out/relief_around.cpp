@@ -94,6 +94,8 @@ ReliefAround::ReliefAround(Image heights, double pixel_m, bool tileable, ReliefM
 
 std::vector<ReliefAround::Place> ReliefAround::places(const Vec3& p, const Vec3& normal) const {
     const Vec3 d = p - middle_;
+    if (map_ == ReliefMap::planar)
+        return {along_axis(d, 2, true, 1)};
     if (map_ == ReliefMap::cube) {
         const int axis = main_axis(normal);
         return {along_axis(d, axis, normal[axis] > 0, 1)};

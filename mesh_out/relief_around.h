@@ -9,6 +9,7 @@ namespace taihu {
 
 /// How a height tile is laid around an object.
 enum class ReliefMap {
+    planar,   ///< from the front, along -Z, through to the back
     sphere,   ///< by longitude about +Y and latitude, as seen from the frame's middle
     cube,     ///< along the axis that the surface faces most
     cylinder, ///< by longitude about the frame's upright axis, and height

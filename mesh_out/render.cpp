@@ -240,25 +240,27 @@ private:
         normal = side > 0 ? normal : side < 0 ? -normal : flat;
         const Vec3 at = corners[0] * (1 - hit.u - hit.v) + corners[1] * hit.u + corners[2] * hit.v +
                         flat * kRayOffset;
-        double albedo = settings_.albedo;
-        if (settings_.normal_at || settings_.albedo_at) {
+        double albedo = settings_.plain ? 1 : settings_.albedo;
+        Vec3 tint = settings_.plain ? settings_.plain->color : settings_.tint;
+        if (settings_.normal_at || settings_.albedo_at || settings_.tint_at) {
             const Vec3 on_mesh = place_.mesh_point(at), own = place_.turned_back(normal);
             if (settings_.albedo_at)
                 albedo = settings_.albedo_at(on_mesh, own);
+            if (settings_.tint_at)
+                tint = settings_.tint_at(on_mesh, own);
             if (settings_.normal_at)
                 normal = place_.turned(settings_.normal_at(on_mesh, own));
         }
         if (settings_.plain)
-            return plain_light(normal, to) * (settings_.albedo_at ? albedo : 1);
-        return tinted(settings_.tint, sky_light(at, normal, draws) + key_light(at, normal, draws)) *
-               albedo;
+            return tint * (albedo * plain_light(normal, to));
+        return tinted(tint, sky_light(at, normal, draws) + key_light(at, normal, draws)) * albedo;
     }
 
-    Vec3 plain_light(const Vec3& normal, const Vec3& to) const {
+    double plain_light(const Vec3& normal, const Vec3& to) const {
         const PlainLight& plain = *settings_.plain;
         const Vec3 seen = plain.light.direction(); // in the axes of the picture
         const Vec3 light = view_.right * seen.x + view_.up * seen.y - view_.forward * seen.z;
-        return plain.color * intensity(plain.reflection, normal, light, -to);
+        return intensity(plain.reflection, normal, light, -to);
     }
 
     /// What the backdrop is multiplied by where the ray meets the ground: its light as a share of

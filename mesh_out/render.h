@@ -30,6 +30,8 @@ struct RenderSettings {
     /// time.
     std::function<double(const Vec3& at, const Vec3& normal)> albedo_at = {};
     Vec3 tint{1, 1, 1}; ///< colour that the albedo is multiplied by, linear, 0..1
+    /// Or at a place, as albedo_at; of a plain light instead of its colour.
+    std::function<Vec3(const Vec3& at, const Vec3& normal)> tint_at = {};
     /// The normal to shade with at a place of the mesh, of the mesh's own there: as a bump map.
     /// Asked by many threads at a time.
     std::function<Vec3(const Vec3& at, const Vec3& normal)> normal_at = {};

@@ -88,6 +88,10 @@ void Console::say_all(const std::string& where, const std::vector<std::string>& 
 }
 
 void Console::result(const nlohmann::ordered_json& object) const {
+    if (sink) {
+        *sink = object;
+        return;
+    }
     const auto replace = nlohmann::ordered_json::error_handler_t::replace; // names may be any bytes
     if (json && (std::printf("%s\n", object.dump(-1, ' ', false, replace).c_str()) < 0 ||
                  std::fflush(stdout) != 0))

@@ -40,6 +40,7 @@ struct Console {
     bool json = false, quiet = false, no_clobber = false;
     int n_threads = 0; ///< 0: all
     Progress* progress = nullptr;
+    nlohmann::ordered_json* sink = nullptr; ///< takes the result instead of stdout, where set
 
     /// A verb with the common options and runnable examples in its help.
     CLI::App* verb(CLI::App& app, const std::string& name, const std::string& does,
@@ -88,6 +89,7 @@ void add_bake(CLI::App& app, Console& console);
 void add_carve(CLI::App& app, Console& console);
 void add_check(CLI::App& app, Console& console);
 void add_fit(CLI::App& app, Console& console);
+void add_gallery(CLI::App& app, Console& console);
 void add_info(CLI::App& app, Console& console);
 void add_lod(CLI::App& app, Console& console);
 void add_measure(CLI::App& app, Console& console);

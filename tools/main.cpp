@@ -10,6 +10,7 @@
 #include "stats/core/error.h"
 #include "stats/core/text.h"
 #include "tools/console.h"
+#include "tools/verbs.h"
 
 namespace taihu {
 namespace {
@@ -78,21 +79,7 @@ int run(int argc, char** argv) {
     app.get_formatter()->column_width(34);
     app.footer("\nLengths take units: 0.5m, 12mm, 2vox, 25%. `taihu VERB --help` explains a verb.");
     Console console;
-    add_fit(app, console);
-    add_sample(app, console);
-    add_shape(app, console);
-    add_voxelize(app, console);
-    add_carve(app, console);
-    add_rock(app, console);
-    add_mesh(app, console);
-    add_lod(app, console);
-    add_bake(app, console);
-    add_check(app, console);
-    add_measure(app, console);
-    add_section(app, console);
-    add_relief(app, console);
-    add_render(app, console);
-    add_info(app, console);
+    add_verbs(app, console);
     if (argc < 2) {
         std::fputs(app.help().c_str(), stderr);
         return kUsage;

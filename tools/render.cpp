@@ -26,7 +26,8 @@ struct RenderArgs {
     std::string around = "triplanar", tile_side, material, light_azimuth, light_elevation;
     double relief_scale = 1;
     std::optional<int> views;
-    bool levels = false, no_ground = false, flat = false, displace = false;
+    bool levels = false, no_ground = false, flat = false, displace = false, colors = false;
+    std::vector<double> reflection;
     RenderSettings settings;
 };
 
@@ -55,25 +56,27 @@ std::vector<TriMesh> meshes_of(const RenderArgs& args, const Console& console) {
 }
 
 ReliefMap map_of(const std::string& name) {
-    return name == "sphere"     ? ReliefMap::sphere
+    return name == "planar"     ? ReliefMap::planar
+           : name == "sphere"   ? ReliefMap::sphere
            : name == "cube"     ? ReliefMap::cube
            : name == "cylinder" ? ReliefMap::cylinder
                                 : ReliefMap::triplanar;
 }
 
-/// A tile of `taihu relief`, or any EXR with a channel Y.
-std::shared_ptr<const ReliefAround> tile_around(const RenderArgs& args,
-                                                const std::filesystem::path& path, double scale,
-                                                const Box& frame) {
-    const std::vector<std::string> heights = {"Y"};
-    ExrImage exr = read_exr(path, heights);
+/// One channel of a tile of `taihu relief`, or of any EXR that has it, as `value` makes of it.
+template <class Value>
+std::shared_ptr<const ReliefAround>
+tile_around(const RenderArgs& args, const std::filesystem::path& path, const char* channel,
+            const Box& frame, Value&& value) {
+    const std::vector<std::string> wanted = {channel};
+    ExrImage exr = read_exr(path, wanted);
     std::optional<double> pixel_m;
     bool tileable = false;
-    for (const auto& [key, value] : exr.attributes) {
+    for (const auto& [key, text] : exr.attributes) {
         if (key == "pixel_m")
-            pixel_m = parse_number(value);
+            pixel_m = parse_number(text);
         if (key == "wrap")
-            tileable = value == "periodic";
+            tileable = text == "periodic";
     }
     if (!args.tile_side.empty())
         pixel_m = length_m("--tile-side", args.tile_side, {0, frame.longest()}) /
@@ -81,22 +84,38 @@ std::shared_ptr<const ReliefAround> tile_around(const RenderArgs& args,
     if (!pixel_m)
         throw Error(Fault::bad_input, path.string() + ": does not say how large it is; give "
                                                       "--tile-side");
-    for (float& h : exr.image.pixels)
-        h *= static_cast<float>(scale);
+    for (float& p : exr.image.pixels)
+        p = static_cast<float>(value(p));
     return std::make_shared<ReliefAround>(std::move(exr.image), *pixel_m, tileable,
                                           map_of(args.around), frame);
+}
+
+/// The colour subregions of the tile, blended over a pixel at their borders.
+void paint_regions(RenderArgs& args, const Box& frame) {
+    const auto part = [&](int c) {
+        return tile_around(args, args.relief, "color_region", frame,
+                           [c](float id) { return region_color(id)[c]; });
+    };
+    args.settings.tint_at = [red = part(0), green = part(1), blue = part(2)](const Vec3& p,
+                                                                             const Vec3& n) {
+        return Vec3{red->height_m(p, n), green->height_m(p, n), blue->height_m(p, n)};
+    };
 }
 
 void lay_relief(RenderArgs& args, TriMesh& mesh) {
     const Box frame = bounds(mesh);
     if (!args.grain.empty())
-        args.settings.albedo_at = [grain = tile_around(args, args.grain, 1, frame)](const Vec3& p,
-                                                                                    const Vec3& n) {
-            return std::clamp(grain->height_m(p, n), 0.0, 1.0);
+        args.settings.albedo_at = [grain = tile_around(args, args.grain, "Y", frame, [](float y) {
+                                       return std::clamp(y, 0.0F, 1.0F);
+                                   })](const Vec3& p, const Vec3& n) {
+            return grain->height_m(p, n);
         };
+    if (args.colors)
+        paint_regions(args, frame);
     if (args.relief.empty())
         return;
-    const auto relief = tile_around(args, args.relief, args.relief_scale, frame);
+    const auto relief =
+        tile_around(args, args.relief, "Y", frame, [&](float h) { return h * args.relief_scale; });
     if (args.displace) {
         mesh = relief->displaced(mesh);
         return;
@@ -109,6 +128,8 @@ void lay_relief(RenderArgs& args, TriMesh& mesh) {
 void light_plainly(RenderArgs& args) {
     const ReliefMaterial& material = relief_preset(args.material).material;
     PlainLight plain{material.reflection, material.color, {}};
+    if (const std::vector<double>& r = args.reflection; !r.empty())
+        plain.reflection = {r[0], r[1], r[2], r[3]};
     if (!args.light_azimuth.empty())
         plain.light.azimuth_deg = angle_deg("--light-azimuth", args.light_azimuth);
     if (!args.light_elevation.empty())
@@ -174,8 +195,10 @@ void check_options(const RenderArgs& args) {
     };
     const bool tiled = !args.relief.empty() || !args.grain.empty();
     needs(args.displace && args.relief.empty(), "--displace", "--relief");
+    needs(args.colors && args.relief.empty(), "--colors", "--relief");
     needs(args.relief_scale != 1 && args.relief.empty(), "--relief-scale", "--relief");
     needs(!args.tile_side.empty() && !tiled, "--tile-side", "--relief or --grain");
+    needs(!args.reflection.empty() && args.material.empty(), "--reflection", "--material");
     needs(!args.light_azimuth.empty() && args.material.empty(), "--light-azimuth", "--material");
     needs(!args.light_elevation.empty() && args.material.empty(), "--light-elevation",
           "--material");
@@ -248,14 +271,17 @@ void add_render(CLI::App& app, Console& console) {
     verb->add_option("--relief", args->relief,
                      "A height tile (.exr of taihu relief) laid around it: bumps its normals")
         ->excludes(levels);
-    verb->add_option("--around", args->around,
-                     "How: sphere, cube, cylinder, or triplanar, along three axes without seams")
-        ->check(CLI::IsMember({"sphere", "cube", "cylinder", "triplanar"}))
+    verb->add_option(
+            "--around", args->around,
+            "How: planar (from the front), sphere, cube, cylinder, or triplanar, along three "
+            "axes without seams")
+        ->check(CLI::IsMember({"planar", "sphere", "cube", "cylinder", "triplanar"}))
         ->capture_default_str();
     verb->add_option("--relief-scale", args->relief_scale, "Its heights times this")
         ->check(CLI::Range(-1e6, 1e6))
         ->capture_default_str();
     verb->add_flag("--displace", args->displace, "Move the vertices, too, not the normals alone");
+    verb->add_flag("--colors", args->colors, "Paint its colour subregions (relief --colors), too");
     verb->add_option("--grain", args->grain,
                      "A tile (.exr) of albedo, 0..1, laid around it likewise")
         ->excludes(levels);
@@ -264,6 +290,12 @@ void add_render(CLI::App& app, Console& console) {
     verb->add_option("--material", args->material,
                      "Light it plainly, as a relief preset is: broken-rock, unglazed-china, "
                      "casting, ... [sky and sun]");
+    verb->add_option("--reflection", args->reflection,
+                     "With --material: ambient, diffuse, specular weight and exponent instead of "
+                     "its own, as 0.2,1,1,20")
+        ->delimiter(',')
+        ->expected(4)
+        ->check(CLI::Range(0.0, 1000.0));
     verb->add_option("--light-azimuth", args->light_azimuth,
                      "With --material: where light comes from, from the right towards up [135]");
     verb->add_option("--light-elevation", args->light_elevation,

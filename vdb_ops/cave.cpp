@@ -187,8 +187,10 @@ CaveReport measure_cave(const openvdb::FloatGrid& solid, const Vec3& size_m,
                 int n_sides = 0;
                 for (int axis = 0; axis < 3; ++axis) {
                     const double depth = 0.5 * size_m[axis] - std::fabs(p[axis]);
-                    inside = inside && depth >= 0.5 * h;
-                    n_sides += depth < 1.5 * h;
+                    // One layer of voxels, whether points lie on the side or half a voxel from it:
+                    // between the two, where rounding decides nothing.
+                    inside = inside && depth >= 0.25 * h;
+                    n_sides += depth < 1.25 * h;
                 }
                 if (!inside)
                     continue;

@@ -92,11 +92,6 @@ constexpr std::array<Vec3, 8> kPalette = {{{0.12, 0.16, 0.22},
                                            {0.75, 0.73, 0.66},
                                            {0.34, 0.14, 0.04}}};
 
-Vec3 palette_color(float id) {
-    const auto words = Rng{0, kPaletteStream}.words(static_cast<std::uint64_t>(id));
-    return kPalette[words[0] % kPalette.size()];
-}
-
 ReliefSettings law_of(ReliefLaw law, double amplitude_m) {
     ReliefSettings s;
     s.law = law;
@@ -139,6 +134,12 @@ const std::vector<ReliefPreset>& all_presets() {
 
 } // namespace
 
+Vec3 region_color(float id) {
+    const bool known = id >= 0 && id < 1e9F; // files hold anything
+    const auto words = Rng{0, kPaletteStream}.words(known ? static_cast<std::uint64_t>(id) : 0);
+    return kPalette[words[0] % kPalette.size()];
+}
+
 ReliefTile make_relief(const ReliefSettings& settings, Progress* progress) {
     const RegionPlane plane = plane_of(settings, settings.n_regions, settings.seed);
     check_plane(plane);
@@ -172,7 +173,7 @@ Image relief_picture(const ReliefTile& tile, const ReliefMaterial& material,
     Image out(grey.width, grey.height, 3);
     for (std::size_t i = 0; i < grey.pixels.size(); ++i) {
         const Vec3 color =
-            tile.color_ids.width > 0 ? palette_color(tile.color_ids.pixels[i]) : material.color;
+            tile.color_ids.width > 0 ? region_color(tile.color_ids.pixels[i]) : material.color;
         for (int c = 0; c < 3; ++c)
             out.pixels[3 * i + static_cast<std::size_t>(c)] =
                 static_cast<float>(color[c] * grey.pixels[i]);

@@ -75,6 +75,9 @@ struct ReliefMaterial {
     Vec3 color{0.5, 0.5, 0.5}; ///< linear, times the intensity
 };
 
+/// Of a colour subregion, linear: one of eight earths, by its index; what is no index counts as 0.
+Vec3 region_color(float id);
+
 /// The tile from straight above, 3 channels, linear light: Eq. 1 times the material's colour; a
 /// colour subregion has its own instead.
 Image relief_picture(const ReliefTile& tile, const ReliefMaterial& material,

@@ -15,8 +15,8 @@ namespace taihu {
 namespace {
 
 constexpr double kPi = std::numbers::pi;
-constexpr ReliefMap kMaps[] = {ReliefMap::sphere, ReliefMap::cube, ReliefMap::cylinder,
-                               ReliefMap::triplanar};
+constexpr ReliefMap kMaps[] = {ReliefMap::planar, ReliefMap::sphere, ReliefMap::cube,
+                               ReliefMap::cylinder, ReliefMap::triplanar};
 const Box kFrame{{-1, -1, -1}, {1, 1, 1}};
 
 /// height(column, row) of a tile.
@@ -122,6 +122,13 @@ TEST(ReliefAround, ATileKeepsItsSizeOnACube) {
     EXPECT_NEAR(around.height_m({0.3, 1, 0.2}, {0, 1, 0}), 0.3, 1e-6);
     const Vec3 n = around.bumped({0.3, 0.2, 1}, {0, 0, 1});
     EXPECT_NEAR(length(n - normalized({-1, 0, 1})), 0, 1e-5); // floats
+}
+
+TEST(ReliefAround, PlanarGoesStraightThrough) {
+    const Image ramp = tile(201, [](int x, int) { return 0.01 * (x - 100); });
+    const ReliefAround around(ramp, 0.01, false, ReliefMap::planar, kFrame);
+    for (const Vec3& n : directions()) // the height is x wherever it faces
+        EXPECT_NEAR(around.height_m({0.3, n.y, n.z}, n), 0.3, 1e-6);
 }
 
 TEST(SeedRow, T16BumpsLeaveTheSilhouetteAndDisplacementDoesNot) {

@@ -1,8 +1,12 @@
 // taihu render: what lies around a mesh, turns, and its options.
+#include <array>
+#include <set>
+
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
 
+#include "mesh_out/io/exr_file.h"
 #include "mesh_out/io/image_file.h"
 #include "tests/support/command.h"
 
@@ -33,13 +37,40 @@ TEST_F(RenderCommand, AReliefChangesThePictureAndItsScaleAndSideDo) {
     EXPECT_NE(picture("plain.png").pixels, picture("bumped.png").pixels);
     render("--relief tile.exr --relief-scale 0 -o flat.png");
     EXPECT_EQ(picture("flat.png").pixels, picture("plain.png").pixels);
-    for (const char* option :
-         {"--relief-scale 2", "--tile-side 50%", "--around sphere", "--around cube",
-          "--around cylinder", "--displace", "--material unglazed-china", "--grain tile.exr"}) {
+    for (const char* option : {"--relief-scale 2", "--tile-side 50%", "--around sphere",
+                               "--around cube", "--around cylinder", "--around planar",
+                               "--displace", "--material unglazed-china", "--grain tile.exr"}) {
         render(std::string("--relief tile.exr ") + option + " -o other.png --no-ground");
         render("--relief tile.exr -o bumped.png --no-ground");
         EXPECT_NE(picture("other.png").pixels, picture("bumped.png").pixels) << option;
     }
+}
+
+TEST_F(RenderCommand, ColourSubregionsArePaintedWhateverTheirFileHolds) {
+    must("taihu relief convex --size 64 --tileable --pixel 1mm --colors 6 -o cells.exr -q",
+         scratch_);
+    const std::string lit = " --material convex --reflection 0.5,0,0,1 --no-ground -o ";
+    render("--relief cells.exr" + lit + "even.png");
+    render("--relief cells.exr --colors" + lit + "painted.png");
+    const auto n_colors = [&](const char* name) {
+        const Image image = picture(name);
+        std::set<std::array<float, 3>> seen; // in the middle, where nothing is but the ball
+        for (int y = 14; y < 34; ++y)
+            for (int x = 14; x < 34; ++x)
+                seen.insert({image.at(x, y)[0], image.at(x, y)[1], image.at(x, y)[2]});
+        return seen.size();
+    };
+    EXPECT_EQ(n_colors("even.png"), 1u); // ambient light alone
+    EXPECT_GE(n_colors("painted.png"), 3u);
+
+    ExrImage odd;
+    odd.channels = {"Y", "color_region"};
+    odd.attributes = {{"pixel_m", "0.01"}};
+    odd.image = Image(4, 4, 2);
+    for (std::size_t i = 1; i < odd.image.pixels.size(); i += 2)
+        odd.image.pixels[i] = i % 4 == 1 ? -3e9F : 1e30F;
+    write_exr(scratch_ / "odd.exr", odd);
+    render("--relief odd.exr --colors -o odd.png");
 }
 
 TEST_F(RenderCommand, ATurnIsASheetOrFiles) {
@@ -66,6 +97,10 @@ TEST_F(RenderCommand, RefusesOptionsWithoutWhatTheyAreFor) {
     };
     refused("--displace", "--displace: is for --relief");
     refused("--tile-side 1cm", "--tile-side: is for --relief or --grain");
+    refused("--colors", "--colors: is for --relief");
+    refused("--reflection 0,1,0,1", "--reflection: is for --material");
+    refused("--material fractal --reflection 0,1", "--reflection");
+    refused("--relief tile.exr --colors", "color_region", 1); // the tile has none
     refused("--light-azimuth 90", "--light-azimuth: is for --material");
     refused("--material marble", "marble");
     refused("--views 300 --size 1000x1000", "larger than 16384 pixels");

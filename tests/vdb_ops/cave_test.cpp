@@ -57,6 +57,16 @@ TEST(SeedRow, D21EachRockHasItsMiddleInAnEarlierOne) {
     }
 }
 
+TEST(Cave, TheMouthIsSeenWhereverTheLatticeMeetsItsSide) {
+    const CaveSettings settings{
+        .size_m = {2, 1, 1.5}, .fractal = {.base = 0, .iterations = 2}, .seed = 2};
+    // The mouth's side lies on points of the lattice, or half-way between two.
+    const double on = measure_cave(*made(settings, 72).solid, settings.size_m).mouth_m2,
+                 between = measure_cave(*made(settings, 60).solid, settings.size_m).mouth_m2;
+    EXPECT_GT(on, 0.1);
+    EXPECT_NEAR(between, on, 0.15 * on); // of voxels 3 cm wide: a tenth of the mouth's
+}
+
 TEST(Cave, IsARecipeThatMakesTheSameAgain) {
     const CaveSettings settings{.n_rocks = 3, .fractal = {.base = 0, .iterations = 1}, .seed = 5};
     const RecipeSolid cave = made(settings, 48);
