@@ -335,10 +335,13 @@ public:
                 throw Error(Fault::bad_input,
                             t.file + ": its box is not one of a tile, or another's; write the "
                                      "tiles again");
+            world_.expand(t.box);
         }
     }
     const TileSet& set() const { return set_; }
     bool has(const Coord& first) const { return at_.contains(first); }
+    /// All tiles together.
+    const CoordBBox& world() const { return world_; }
 
     /// Its voxels in a box of whole leaves.
     openvdb::FloatGrid::Ptr in(const CoordBBox& box) const {
@@ -392,6 +395,7 @@ private:
     fs::path folder_;
     TileSet set_;
     std::unordered_map<Coord, const Tile*> at_;
+    CoordBBox world_;
 };
 
 /// One box of voxels, with as much around it as it needs.
@@ -402,6 +406,13 @@ void add_box(const Parts& parts, const CoordBBox& box, const ExtractSettings& se
         CoordBBox given = box;
         given.expand(halo);
         const auto solid = parts.in(given);
+        // Beyond all tiles there is nothing, as far as one looks.
+        for (int axis = 0; axis < 3; ++axis) {
+            if (given.min()[axis] <= parts.world().min()[axis])
+                given.min()[axis] -= kMostHalo;
+            if (given.max()[axis] >= parts.world().max()[axis])
+                given.max()[axis] += kMostHalo;
+        }
         if (const auto tile = extract_tile(*solid, given, box, nullptr, settings, progress)) {
             welder.add(*tile);
             return;
