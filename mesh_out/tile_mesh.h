@@ -32,11 +32,13 @@ struct TileMeshResult {
 /// PLY: extract()'s of the level set, its own field, tile after tile. Vertices are written as float
 /// and welded across tiles; pieces of a voxel or two that extract() turns to face outwards stay as
 /// they are. Memory: a tile with what is around it, the vertices and edges on the faces of one
-/// layer of tiles, and four bytes a piece. Beside `out` a second file is made for a while, of its
-/// faces. \param set  a tiles.json. \throws Error as read_tile_set(), read_tile() and extract();
-/// unsupported: 2^32 vertices; numeric:
-///   a place that triangles cross in is so large that no halo of a tile holds it; io; cancelled:
-///   nothing is left.
+/// layer of tiles, and some bytes for each piece that a tile sees. Tiles are read once for each
+/// tile beside them. Next to `out` a second file is made for a while, of its faces.
+/// \param set  a tiles.json.
+///
+/// \throws Error as read_tile_set(), read_tile() and extract(); unsupported: 2^32 vertices;
+/// numeric: a place that triangles cross in is so large that no halo of a tile holds it; io;
+/// cancelled: nothing is left.
 TileMeshResult write_tile_mesh(const std::filesystem::path& set, const std::filesystem::path& out,
                                const ExtractSettings& settings = {}, Progress* progress = nullptr);
 
