@@ -90,7 +90,8 @@ private:
 
 } // namespace
 
-CellBlocks::CellBlocks(const openvdb::FloatGrid& solid, Progress* progress) {
+CellBlocks::CellBlocks(const openvdb::FloatGrid& solid, const openvdb::CoordBBox& given,
+                       Progress* progress) {
     const openvdb::FloatTree& tree = solid.tree();
     std::vector<Coord> origins;
     // Cells that reach into a leaf from below begin in other blocks.
@@ -100,6 +101,9 @@ CellBlocks::CellBlocks(const openvdb::FloatGrid& solid, Progress* progress) {
                                                       -(k & 1) * kBlock));
     tbb::parallel_sort(origins.begin(), origins.end());
     origins.erase(std::unique(origins.begin(), origins.end()), origins.end());
+    std::erase_if(origins, [&](const Coord& c) {
+        return !given.isInside(c) || !given.isInside(c.offsetBy(kBlock));
+    });
     check_cancelled(progress);
     std::vector<CellBlock> all(origins.size());
     std::vector<char> passed(origins.size());

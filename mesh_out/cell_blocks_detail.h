@@ -62,7 +62,9 @@ struct CellRef {
 /// The blocks that the zero surface of a level set passes, in the order of their origins.
 class CellBlocks {
 public:
-    CellBlocks(const openvdb::FloatGrid& solid, Progress* progress);
+    /// \param given  blocks with voxels outside of it are left out.
+    CellBlocks(const openvdb::FloatGrid& solid, const openvdb::CoordBBox& given,
+               Progress* progress);
 
     std::size_t size() const { return blocks_.size(); }
     CellBlock& operator[](std::size_t i) { return blocks_[i]; }

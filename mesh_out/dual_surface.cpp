@@ -61,26 +61,32 @@ Coord along(int axis, int by) {
 
 } // namespace
 
-DualSurface::DualSurface(const CellBlocks& blocks, const SurfacePoints& points) : blocks_(blocks) {
-    join_faces(points);
+DualSurface::DualSurface(const CellBlocks& blocks, const SurfacePoints& points,
+                         Certainty& certainty)
+    : blocks_(blocks) {
+    join_faces(points, certainty);
     number_vertices();
     make_polygons();
 }
 
-CellRef DualSurface::single(const Coord& voxel) const {
-    const std::uint32_t block = *blocks_.find(voxel);
-    return {block, CellBlocks::number(voxel - blocks_[block].origin), 1};
+std::optional<CellRef> DualSurface::single(const Coord& voxel) const {
+    const auto block = blocks_.find(voxel);
+    if (!block)
+        return std::nullopt;
+    return CellRef{*block, CellBlocks::number(voxel - blocks_[*block].origin), 1};
+}
+
+bool DualSurface::is_joined(const CellRef& cell, int face) const {
+    const auto owner = face % 2 == 0 ? cell : single(voxel_of(cell) + along(face / 2, 1));
+    return owner && joined_.at(face_key(*owner, face / 2));
 }
 
 unsigned DualSurface::joined(const CellRef& cell, unsigned corners) const {
     const unsigned alternating = cell.size == 1 ? alternating_faces(corners) : 0;
     unsigned bits = 0;
     for (int face = 0; face < 6 && alternating != 0; ++face)
-        if (alternating >> face & 1) {
-            const CellRef owner =
-                face % 2 == 0 ? cell : single(voxel_of(cell) + along(face / 2, 1));
-            bits |= static_cast<unsigned>(joined_.at(face_key(owner, face / 2))) << face;
-        }
+        if (alternating >> face & 1)
+            bits |= static_cast<unsigned>(is_joined(cell, face)) << face;
     return bits;
 }
 
@@ -92,7 +98,13 @@ bool DualSurface::in_one_loop(const CellRef& cell, int face) const {
     return loop(0) == loop(1) && loop(1) == loop(2) && loop(2) == loop(3);
 }
 
-void DualSurface::join_faces(const SurfacePoints& points) {
+/// Whether the vertices of two cells would be joined by both arcs of the face between them.
+bool DualSurface::could_meet_twice(const CellRef& above, int axis) const {
+    const auto below = single(voxel_of(above) - along(axis, 1));
+    return below && in_one_loop(above, 2 * axis) && in_one_loop(*below, 2 * axis + 1);
+}
+
+void DualSurface::join_faces(const SurfacePoints& points, Certainty& certainty) {
     struct Face {
         CellRef above; ///< its lower face along `axis`
         int axis;
@@ -120,18 +132,19 @@ void DualSurface::join_faces(const SurfacePoints& points) {
         faces.insert(faces.end(), f.begin(), f.end());
     for (const Face& f : faces)
         joined_.emplace(face_key(f.above, f.axis), f.joined);
-    // Two cells whose vertices would be joined by both arcs of a face: the other arcs part them in
-    // both. Each time there is a curve more, so it ends.
-    for (bool any = true; any;) {
-        any = false;
-        for (const Face& f : faces)
-            if (in_one_loop(f.above, 2 * f.axis) &&
-                in_one_loop(single(voxel_of(f.above) - along(f.axis, 1)), 2 * f.axis + 1)) {
-                bool& flag = joined_.at(face_key(f.above, f.axis));
-                flag = !flag;
-                any = true;
-            }
+    // The other arcs part the vertices in both cells. Each time there is a curve more, and fewer
+    // faces that do this, so once over them is enough.
+    std::erase_if(faces, [&](const Face& f) { return !could_meet_twice(f.above, f.axis); });
+    std::vector<Box> boxes;
+    for (const Face& f : faces) {
+        const Coord voxel = voxel_of(f.above);
+        boxes.push_back({points.voxel(voxel.offsetBy(-1)), points.voxel(voxel.offsetBy(1))});
+        if (could_meet_twice(f.above, f.axis)) {
+            bool& flag = joined_.at(face_key(f.above, f.axis));
+            flag = !flag;
+        }
     }
+    certainty.decided(boxes);
 }
 
 void DualSurface::number_vertices() {
@@ -165,8 +178,8 @@ bool DualSurface::polygon_across(std::uint32_t block, const Coord& voxel, int ax
         if (!on_b && !on_c)
             return false;
         if (on_b != on_c) {
-            const CellRef other = *blocks_.cell(block, voxel - along(on_b ? b : c, 1));
-            if (voxel[on_b ? c : b] % other.size != 0)
+            const auto other = blocks_.cell(block, voxel - along(on_b ? b : c, 1));
+            if (!other || voxel[on_b ? c : b] % other->size != 0)
                 return false;
         }
     }
@@ -176,7 +189,10 @@ bool DualSurface::polygon_across(std::uint32_t block, const Coord& voxel, int ax
     polygon.n = 0;
     for (const auto& offset : kAround) {
         const Coord at = voxel + along(b, offset[0]) + along(c, offset[1]);
-        const CellRef cell = *blocks_.cell(block, at);
+        const auto found = blocks_.cell(block, at);
+        if (!found)
+            return false;
+        const CellRef& cell = *found;
         if (n > 0 && ring[n - 1] == cell)
             continue;
         ring[n++] = cell;

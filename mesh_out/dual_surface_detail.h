@@ -1,10 +1,12 @@
 #pragma once
 #include <array>
 #include <cstdint>
+#include <optional>
 #include <unordered_map>
 #include <vector>
 
 #include "mesh_out/cell_blocks_detail.h"
+#include "mesh_out/extract_certainty_detail.h"
 #include "mesh_out/surface_points_detail.h"
 
 namespace taihu {
@@ -19,7 +21,8 @@ struct DualPolygon {
 /// Which vertices a surface has in the cells of an octree and which polygons join them: one vertex
 /// for each curve in which it passes a cell's faces, so that it is a closed 2-manifold whatever the
 /// signs. Where corners of a face alternate, both cells beside it join the same of them; and never
-/// so that two faces of the mesh could share both ends of two edges.
+/// so that two faces of the mesh could share both ends of two edges. Of a part of a solid, it ends
+/// where blocks are missing.
 class DualSurface {
 public:
     struct Edge {
@@ -28,7 +31,7 @@ public:
     };
 
     /// \throws Error unsupported: 2^32 vertices or more.
-    DualSurface(const CellBlocks& blocks, const SurfacePoints& points);
+    DualSurface(const CellBlocks& blocks, const SurfacePoints& points, Certainty& certainty);
 
     std::size_t n_vertices() const { return cells_.size(); }
     const CellRef& cell(std::size_t vertex) const { return cells_[vertex]; }
@@ -38,7 +41,9 @@ public:
 
 private:
     unsigned joined(const CellRef& cell, unsigned corners) const;
-    void join_faces(const SurfacePoints& points);
+    void join_faces(const SurfacePoints& points, Certainty& certainty);
+    bool is_joined(const CellRef& cell, int face) const;
+    bool could_meet_twice(const CellRef& above, int axis) const;
     bool in_one_loop(const CellRef& cell, int face) const;
     void number_vertices();
     void make_polygons();
@@ -51,7 +56,7 @@ private:
     openvdb::Coord voxel_of(const CellRef& cell) const {
         return blocks_[cell.block].origin + CellBlocks::local(cell.first);
     }
-    CellRef single(const openvdb::Coord& voxel) const;
+    std::optional<CellRef> single(const openvdb::Coord& voxel) const;
 
     const CellBlocks& blocks_;
     std::unordered_map<std::uint64_t, bool> joined_; ///< by the lower faces of cells

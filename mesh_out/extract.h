@@ -1,4 +1,7 @@
 #pragma once
+#include <cstddef>
+#include <optional>
+
 #include <openvdb/openvdb.h>
 
 #include "mesh_out/labelled_mesh.h"
@@ -37,6 +40,32 @@ struct ExtractSettings {
 /// unsupported: 2^32 vertices; cancelled: between blocks.
 LabelledMesh extract(const openvdb::FloatGrid& solid, const Field* field,
                      const ExtractSettings& settings = {}, Progress* progress = nullptr);
+
+/// What a tile owns of a surface, and what is around it.
+struct TileSurface {
+    LabelledMesh mesh; ///< first the triangles that the tile owns, then those that come near them
+    std::size_t n_owned = 0;
+};
+
+/// Voxels around a tile that are usually enough for extract_tile().
+inline constexpr int kTileHalo_vox = 160;
+
+/// The part of extract()'s surface that stands across the edges between voxels which begin in a
+/// tile: tiles without gaps have all of its triangles, each once, bit for bit. But for what looks
+/// at whole pieces: those of a voxel or two that extract() turns to face outwards stay as they are.
+///
+/// Where vertices go depends on what is around them. Those of triangles that cross go together, so
+/// a tile is only known where no chain of such places leads from it to the end of what is given.
+/// \param given  a box of whole leaves in which `solid` is that of the whole.
+/// \param tile   of whole leaves, in `given`.
+/// \return no triangles where the tile has no surface; nothing when `given` is too small: 112
+///   voxels more than the tile at each side are the least.
+/// \throws Error as extract(), but for solids without a surface.
+std::optional<TileSurface> extract_tile(const openvdb::FloatGrid& solid,
+                                        const openvdb::CoordBBox& given,
+                                        const openvdb::CoordBBox& tile, const Field* field,
+                                        const ExtractSettings& settings = {},
+                                        Progress* progress = nullptr);
 
 /// Unit normals for shading, from the gradients of the primitives that vertices lie on; on rims
 /// their mean.

@@ -1,10 +1,18 @@
 #include "mesh_out/extract_mesher_detail.h"
 
 #include <algorithm>
+#include <array>
+#include <unordered_set>
 #include <utility>
 
 namespace taihu {
 namespace {
+
+std::uint64_t mixed(std::uint64_t x) {
+    x = (x ^ (x >> 32)) * 0x9e3779b97f4a7c15u;
+    x = (x ^ (x >> 29)) * 0xbf58476d1ce4e5b9u;
+    return x ^ (x >> 32);
+}
 
 /// A polygon after `w` has become `v`; that of opposite corners is no more.
 DualPolygon joined(const DualPolygon& before, std::uint32_t v, std::uint32_t w) {
@@ -53,38 +61,104 @@ bool is_disk(std::span<const DualPolygon> polygons, std::uint32_t v) {
 } // namespace
 
 /// Joins vertices of the polygons that are so near each other, those on rims to others of the same
-/// rim or a corner of it; with `least_labels` 1 those on faces, too.
+/// rim or a corner of it; with `least_labels` 1 those on faces, too. In an order as good as random,
+/// so that what becomes of two depends on few others, however long a row of such there is.
 /// \return whether there were any; then the lists are to be made anew.
 bool Mesher::join_near(std::span<const std::uint32_t> polygons, double near_m,
                        std::size_t least_labels) {
     bool any = false;
-    const auto& labels = mesh_.labels;
-    for (const std::uint32_t number : polygons) {
-        const DualPolygon& p = polygons_[number];
-        for (std::size_t i = 0; i < p.n; ++i)
-            for (std::size_t k = i + 1; k < p.n; ++k) {
-                std::uint32_t v = p.vertices[i], w = p.vertices[k];
-                if (std::pair(labels[w].size(), v) > std::pair(labels[v].size(), w))
-                    std::swap(v, w);
-                if (labels[w].size() >= least_labels && labels[w].within(labels[v]) &&
-                    length_squared(mesh_.positions[v] - mesh_.positions[w]) < near_m * near_m)
-                    any = join(v, w) || any;
+    const bool of_part = !certainty_.is_of_all();
+    std::unordered_set<std::uint32_t> uncertain; // polygons
+    std::vector<Box> boxes;
+    for (const Near& pair : near_pairs(polygons, near_m, least_labels)) {
+        std::uint32_t v = now(pair.v), w = now(pair.w);
+        const Vertices around = around_both(v, w);
+        if (of_part) {
+            const Box box = reach(std::array{pair.v, pair.w});
+            if (!certainty_.holds(box) ||
+                std::any_of(around.begin(), around.end(),
+                            [&](std::uint32_t i) { return uncertain.contains(i); })) {
+                uncertain.insert(around.begin(), around.end());
+                boxes.push_back(box);
             }
+        }
+        if (v != w && are_near(v, w, near_m, least_labels))
+            any = join(v, w, around) || any;
     }
+    certainty_.lose(boxes);
     return any;
 }
 
-/// Makes `w` the vertex `v`, if the surface stays what it is.
-bool Mesher::join(std::uint32_t v, std::uint32_t w) {
-    for (const std::uint32_t end : {v, w})
-        if (apart_.contains(small_cell(surface_.cell(end), 2)))
-            return false;
+/// Those that are near each other, or may be once one of them has moved by half of that.
+std::vector<Mesher::Near> Mesher::near_pairs(std::span<const std::uint32_t> polygons, double near_m,
+                                             std::size_t least_labels) const {
+    std::vector<Near> pairs;
+    for (const std::uint32_t number : polygons) {
+        const DualPolygon& p = polygons_[number];
+        for (std::size_t i = 0; i < p.n; ++i)
+            for (std::size_t k = i + 1; k < p.n; ++k)
+                if (std::uint32_t v = p.vertices[i], w = p.vertices[k];
+                    are_near(v, w, 1.5 * near_m, least_labels))
+                    pairs.push_back({mixed(3 * cell_key(v) + cell_key(w)), v, w});
+    }
+    std::sort(pairs.begin(), pairs.end());
+    pairs.erase(std::unique(pairs.begin(), pairs.end()), pairs.end());
+    return pairs;
+}
+
+/// A number for the place of its cell.
+std::uint64_t Mesher::cell_key(std::uint32_t v) const {
+    const CellRef& cell = surface_.cell(v);
+    const auto at = blocks_[cell.block].origin + CellBlocks::local(cell.first);
+    std::uint64_t key = 0;
+    for (int axis = 0; axis < 3; ++axis)
+        key = mixed(key ^ static_cast<std::uint32_t>(at[axis]));
+    return key;
+}
+
+/// What a vertex has become.
+std::uint32_t Mesher::now(std::uint32_t v) const {
+    for (auto at = became_.find(v); at != became_.end(); at = became_.find(v))
+        v = at->second;
+    return v;
+}
+
+/// The polygons around two vertices and all that became these.
+Mesher::Vertices Mesher::around_both(std::uint32_t v, std::uint32_t w) const {
     Vertices all;
     for (const std::uint32_t end : {v, w})
         for (std::uint32_t x = end; x != kNone; x = next_[x])
             all.insert(all.end(), around(x).begin(), around(x).end());
     std::sort(all.begin(), all.end());
     all.erase(std::unique(all.begin(), all.end()), all.end());
+    return all;
+}
+
+/// Whether they are to be joined; v is the one to stay then.
+bool Mesher::are_near(std::uint32_t& v, std::uint32_t& w, double near_m,
+                      std::size_t least_labels) const {
+    const auto& labels = mesh_.labels;
+    if (std::pair(labels[w].size(), v) > std::pair(labels[v].size(), w))
+        std::swap(v, w);
+    return labels[w].size() >= least_labels && labels[w].within(labels[v]) &&
+           length_squared(mesh_.positions[v] - mesh_.positions[w]) < near_m * near_m;
+}
+
+/// Makes `w` the vertex `v`, if the surface stays what it is. \param all  as around_both().
+bool Mesher::join(std::uint32_t v, std::uint32_t w, const Vertices& all) {
+    if (!may_move(v) || !may_move(w))
+        return false;
+    for (const std::uint32_t end : {v, w})
+        if (apart_.contains(small_cell(surface_.cell(end), 2)))
+            return false;
+    const auto has_both = [&](std::uint32_t i) {
+        const auto& [vertices, n] = polygons_[i];
+        const auto end = vertices.begin() + n;
+        return std::find(vertices.begin(), end, v) != end &&
+               std::find(vertices.begin(), end, w) != end;
+    };
+    if (std::none_of(all.begin(), all.end(), has_both))
+        return false;
     std::vector<DualPolygon> after;
     for (const std::uint32_t i : all)
         after.push_back(joined(polygons_[i], v, w));
@@ -104,6 +178,7 @@ bool Mesher::join(std::uint32_t v, std::uint32_t w) {
     while (next_[last] != kNone)
         last = next_[last];
     next_[last] = w;
+    became_[w] = v;
     return true;
 }
 

@@ -5,11 +5,6 @@
 #include <numeric>
 
 namespace taihu {
-namespace {
-
-constexpr double kTwins_vox = 0.35; // rim vertices so near each other are one
-
-} // namespace
 
 std::vector<std::uint32_t> Mesher::run() {
     next_.assign(surface_.n_vertices(), kNone);
@@ -45,6 +40,17 @@ LabelledMesh Mesher::take() {
     return std::move(mesh_);
 }
 
+std::vector<std::uint8_t> Mesher::owned_by(const openvdb::CoordBBox& box) const {
+    std::vector<std::uint8_t> owned(first_triangle_.back());
+    for (std::size_t i = 0; i < polygons_.size(); ++i) {
+        const auto& edge = surface_.edges()[i];
+        if (box.isInside(blocks_[edge.block].origin + CellBlocks::local(edge.key % 512)))
+            std::fill(owned.begin() + first_triangle_[i], owned.begin() + first_triangle_[i + 1],
+                      1);
+    }
+    return owned;
+}
+
 void Mesher::find_crossings() {
     const auto& edges = surface_.edges();
     crossings_.resize(edges.size());
@@ -73,6 +79,8 @@ void Mesher::place() {
     mesh_.labels.resize(surface_.n_vertices());
     stage_.assign(surface_.n_vertices(), 0);
     each(surface_.n_vertices(), [&](const SurfacePoints& points, std::size_t v) {
+        if (around(v).empty()) // where a part of a solid ends
+            return;
         const auto placed =
             points.place(crossings_of(v), cell_box(v), kSlack_vox * points.voxel_m());
         mesh_.positions[v] = placed.point;

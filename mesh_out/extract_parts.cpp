@@ -41,12 +41,13 @@ public:
         : mesh_(mesh), field_(field), lattice_(lattice), voxel_m_(lattice.voxel_m),
           bound_m_(bound_vox * lattice.voxel_m), from_(from), n_before_(mesh.positions.size()) {}
 
-    /// \return whether there were any.
-    bool run(Progress* progress) {
+    /// \param parents  of triangles that are added. \return whether there were any.
+    bool run(std::vector<std::uint32_t>& parents, Certainty& certainty, Progress* progress) {
         find();
         if (parts_.empty())
             return false;
         list_triangles();
+        tell(certainty);
         do { // each time there is a part less
             check_cancelled(progress);
             split();
@@ -55,6 +56,7 @@ public:
             mesh_.triangles[parted_[k]] = new_[first_[k]];
             mesh_.triangles.insert(mesh_.triangles.end(), new_.begin() + first_[k] + 1,
                                    new_.begin() + first_[k + 1]);
+            parents.resize(parents.size() + std::size_t(first_[k + 1] - first_[k] - 1), parted_[k]);
         }
         return true;
     }
@@ -187,6 +189,24 @@ private:
                 near_.push_back(corners);
         }
     }
+    /// Parts of a triangle are kept or not together, and with those of triangles that they may
+    /// cross.
+    void tell(Certainty& certainty) const {
+        if (certainty.is_of_all())
+            return;
+        std::vector<Box> boxes;
+        for (const std::uint32_t t : parted_) {
+            Box box;
+            for (const std::uint32_t v : mesh_.triangles[t])
+                box.include(mesh_.positions[v]);
+            const Middles middle = middles(mesh_.triangles[t]);
+            for (const auto& m : {middle[0], middle[1], middle[2], vertex(kTriangle, t)})
+                if (m)
+                    box.include(parts_[*m - n_before_].point);
+            boxes.push_back(box.dilated(kLeastApart * voxel_m_));
+        }
+        certainty.decided(boxes);
+    }
     openvdb::Coord coarse(const Vec3& p) const {
         const Vec3 at = (p - lattice_.origin) / (16 * lattice_.voxel_m);
         return {int(std::floor(at.x)), int(std::floor(at.y)), int(std::floor(at.z))};
@@ -313,16 +333,19 @@ private:
 
 } // namespace
 
-void part_long_triangles(LabelledMesh& mesh, const FieldProbe& field, const Lattice& lattice,
-                         double bound_vox, Progress* progress) {
+std::vector<std::uint32_t> part_long_triangles(LabelledMesh& mesh, const FieldProbe& field,
+                                               const Lattice& lattice, double bound_vox,
+                                               Certainty& certainty, Progress* progress) {
     constexpr int kRounds = 3; // edges to corners are long again
+    std::vector<std::uint32_t> parents;
     std::size_t from = 0;
     for (int i = 0; i < kRounds; ++i) {
         const std::size_t next = mesh.positions.size();
-        if (!Parts(mesh, field, lattice, bound_vox, from).run(progress))
+        if (!Parts(mesh, field, lattice, bound_vox, from).run(parents, certainty, progress))
             break;
         from = next;
     }
+    return parents;
 }
 
 } // namespace taihu

@@ -1,4 +1,8 @@
 #pragma once
+#include <cstdint>
+#include <vector>
+
+#include "mesh_out/extract_certainty_detail.h"
 #include "mesh_out/labelled_mesh.h"
 #include "stats/core/progress.h"
 #include "vdb_ops/field.h"
@@ -10,7 +14,9 @@ namespace taihu {
 /// from these that are farther than `bound_vox` off their face or rim. Where triangles would cross
 /// then, they stay as they are. New vertices come after all others. \param mesh  closed; no
 /// triangles cross.
-void part_long_triangles(LabelledMesh& mesh, const FieldProbe& field, const Lattice& lattice,
-                         double bound_vox, Progress* progress);
+/// \return for each new triangle, that it is a part of; new ones come after all others.
+std::vector<std::uint32_t> part_long_triangles(LabelledMesh& mesh, const FieldProbe& field,
+                                               const Lattice& lattice, double bound_vox,
+                                               Certainty& certainty, Progress* progress);
 
 } // namespace taihu

@@ -30,24 +30,17 @@ void make_set(std::vector<std::uint32_t>& all) {
 /// towards the middle of their cells. Those of cells that cannot be helped so are returned.
 Mesher::Vertices Mesher::retreat() {
     constexpr int kMostRounds = 16;
-    std::vector<std::uint8_t> picked = untamed();
-    if (relax(picked))
-        return {};
-    const Vertices polygons = polygons_around(in_trouble(picked, true));
-    Vertices vertices;
-    for (const std::uint32_t i : polygons)
-        vertices.insert(vertices.end(), polygons_[i].vertices.begin(),
-                        polygons_[i].vertices.begin() + polygons_[i].n);
-    make_set(vertices);
+    Vertices hit = in_trouble(untamed(), true);
+    hold_others(hit);
+    hit = relax(std::move(hit));
+    const Vertices polygons = polygons_around(hit), vertices = vertices_of(polygons);
     if (join_near(polygons, points_.voxel_m(), 1)) {
         list_polygons();
         split_all();
-        picked = split_around(vertices);
-        if (relax(picked))
-            return {};
     }
-    Vertices hit;
-    for (int round = 0; round < kMostRounds; ++round) {
+    hit = relax(in_trouble(split_around(vertices), true));
+    std::vector<std::uint8_t> picked = split_around(hit);
+    for (int round = 0; round < kMostRounds && !hit.empty(); ++round) {
         hit = in_trouble(picked, false);
         if (std::all_of(hit.begin(), hit.end(),
                         [&](std::uint32_t v) { return stage_[v] >= kLastStage; }))
@@ -59,30 +52,41 @@ Mesher::Vertices Mesher::retreat() {
     return hit;
 }
 
-/// Whether nothing is in trouble any more.
-bool Mesher::relax(std::vector<std::uint8_t>& picked) {
+/// From now on only vertices around troubled ones may move.
+void Mesher::hold_others(std::span<const std::uint32_t> hit) {
+    movable_.assign(mesh_.positions.size(), 0);
+    const Vertices polygons = polygons_around(hit);
+    for (const std::uint32_t v : vertices_of(polygons))
+        movable_[v] = 1;
+    for (const std::uint32_t i : near_to(flags_of(polygons)))
+        for (std::size_t k = 0; k < polygons_[i].n; ++k)
+            if (const std::uint32_t v = polygons_[i].vertices[k]; movable_[v] || !is_alone(v))
+                crowded_.push_back(v);
+    make_set(crowded_);
+    if (certainty_.is_of_all())
+        return;
+    std::vector<Box> boxes;
+    for (const std::uint32_t v : hit)
+        boxes.push_back(reach(vertices_of(polygons_around({&v, 1}))));
+    certainty_.decided(boxes);
+}
+
+/// \return what is in trouble still.
+Mesher::Vertices Mesher::relax(Vertices hit) {
     constexpr int kRounds = 3;
-    for (int round = 0; round < kRounds; ++round) {
-        Vertices moving = in_trouble(picked, true);
-        if (moving.empty())
-            return true;
-        if (round > 0) { // they alone were not enough
-            Vertices ring;
-            for (const std::uint32_t i : polygons_around(moving))
-                ring.insert(ring.end(), polygons_[i].vertices.begin(),
-                            polygons_[i].vertices.begin() + polygons_[i].n);
-            make_set(ring);
-            moving = std::move(ring);
-        }
+    for (int round = 0; round < kRounds && !hit.empty(); ++round) {
+        // From the second time on with those around: they alone were not enough.
+        Vertices moving = round > 0 ? vertices_of(polygons_around(hit)) : hit;
+        std::erase_if(moving, [&](std::uint32_t v) { return !may_move(v); });
         std::vector<Vec3> to(moving.size());
         each(moving.size(), [&](const SurfacePoints& points, std::size_t i) {
             to[i] = relaxed(points, moving[i]);
         });
         for (std::size_t i = 0; i < moving.size(); ++i)
             mesh_.positions[moving[i]] = to[i];
-        picked = split_around(moving);
+        hit = in_trouble(split_around(moving), true);
     }
-    return false;
+    return hit;
 }
 
 /// A place between its neighbours on the same face or rim.
@@ -102,7 +106,8 @@ Vec3 Mesher::relaxed(const SurfacePoints& points, std::uint32_t v) const {
     if (own.empty() || own.size() == PrimitiveSet::kMost || n == 0)
         return p;
     const auto to = onto(points.field(), own, sum / n, 2 * points.voxel_m());
-    return to && points.is_on(*to) ? *to : p;
+    const Box about = cell_box(v).dilated(kFarthest_vox * points.voxel_m());
+    return to && about.contains(*to) && points.is_on(*to) ? *to : p;
 }
 
 Mesher::Vertices Mesher::polygons_around(std::span<const std::uint32_t> vertices) const {
@@ -113,15 +118,39 @@ Mesher::Vertices Mesher::polygons_around(std::span<const std::uint32_t> vertices
     return polygons;
 }
 
+Mesher::Vertices Mesher::vertices_of(std::span<const std::uint32_t> polygons) const {
+    Vertices vertices;
+    for (const std::uint32_t i : polygons)
+        vertices.insert(vertices.end(), polygons_[i].vertices.begin(),
+                        polygons_[i].vertices.begin() + polygons_[i].n);
+    make_set(vertices);
+    return vertices;
+}
+
+/// Where the triangles around vertices are, wherever these may move.
+Box Mesher::reach(std::span<const std::uint32_t> vertices) const {
+    Box box;
+    for (const std::uint32_t v : vertices_of(polygons_around(vertices))) {
+        const Box cell = cell_box(v);
+        box.include(cell.lo);
+        box.include(cell.hi);
+    }
+    return box.dilated(kFarthest_vox * points_.voxel_m());
+}
+
 /// Splits the polygons of vertices that moved, and picks them.
 std::vector<std::uint8_t> Mesher::split_around(std::span<const std::uint32_t> vertices) {
     const Vertices polygons = polygons_around(vertices);
     each(polygons.size(),
          [&](const SurfacePoints& points, std::size_t i) { split(points, polygons[i]); });
-    std::vector<std::uint8_t> picked(polygons_.size());
+    return flags_of(polygons);
+}
+
+std::vector<std::uint8_t> Mesher::flags_of(std::span<const std::uint32_t> polygons) const {
+    std::vector<std::uint8_t> flags(polygons_.size());
     for (const std::uint32_t i : polygons)
-        picked[i] = 1;
-    return picked;
+        flags[i] = 1;
+    return flags;
 }
 
 /// Polygons that may cross others.
@@ -225,6 +254,8 @@ void Mesher::step_back(const SurfacePoints& points, std::uint32_t v) {
 /// vertices in one place. \param all  not only those outside of their cells.
 Mesher::Vertices Mesher::in_trouble(const std::vector<std::uint8_t>& picked, bool all) const {
     Vertices hit;
+    if (!movable_.empty() && std::find(picked.begin(), picked.end(), 1) == picked.end())
+        return hit;
     for (std::size_t i = 0; i < picked.size(); ++i)
         for (auto t = first_triangle_[i]; picked[i] && t < first_triangle_[i + 1]; ++t)
             if (is_needle(mesh_.triangles[t]))
@@ -238,8 +269,7 @@ Mesher::Vertices Mesher::in_trouble(const std::vector<std::uint8_t>& picked, boo
         }
     for (const auto& pair : crossing_pairs(mesh_.positions, faces, of_picked))
         add_movable(std::array{faces[pair.first], faces[pair.second]}, all, hit);
-    if (hit.empty())
-        hit = in_one_place();
+    add_in_one_place(movable_.empty() ? all_not_alone() : crowded_, hit);
     make_set(hit);
     return hit;
 }
@@ -278,7 +308,7 @@ void Mesher::add_movable(std::span<const Triangle> triangles, bool all, Vertices
         const std::size_t before = hit.size();
         for (const Triangle& t : triangles)
             for (const std::uint32_t v : t)
-                if (any || (stage_[v] < kOutside && !in_cell(v)))
+                if (may_move(v) && (any || (stage_[v] < kOutside && !in_cell(v))))
                     hit.push_back(v);
         return hit.size() > before;
     };
@@ -294,28 +324,36 @@ bool Mesher::is_needle(const Triangle& t) const {
            kThin * std::max({length_squared(ab), length_squared(ac), length_squared(bc)});
 }
 
-Mesher::Vertices Mesher::in_one_place() const {
+/// Most are, well in their cells.
+bool Mesher::is_alone(std::uint32_t v) const {
     const double least_m = kLeastApart_vox * points_.voxel_m();
-    // Most are alone, well in their cells.
+    return around(v).empty() ||
+           (cell_box(v).dilated(-least_m).contains(mesh_.positions[v]) &&
+            (v == 0 || surface_.cell(v - 1) != surface_.cell(v)) &&
+            (v + 1 == mesh_.positions.size() || surface_.cell(v + 1) != surface_.cell(v)));
+}
+
+Mesher::Vertices Mesher::all_not_alone() const {
     std::vector<std::uint8_t> alone(mesh_.positions.size());
-    tbb::parallel_for(tbb::blocked_range<std::size_t>(0, alone.size(), 1024), [&](const auto& r) {
-        for (std::size_t v = r.begin(); v < r.end(); ++v)
-            alone[v] = around(v).empty() ||
-                       (cell_box(v).dilated(-least_m).contains(mesh_.positions[v]) &&
-                        (v == 0 || surface_.cell(v - 1) != surface_.cell(v)) &&
-                        (v + 1 == alone.size() || surface_.cell(v + 1) != surface_.cell(v)));
-    });
-    Vertices order;
+    tbb::parallel_for(std::size_t{0}, alone.size(),
+                      [&](std::size_t v) { alone[v] = is_alone(static_cast<std::uint32_t>(v)); });
+    Vertices others;
     for (std::uint32_t v = 0; v < alone.size(); ++v)
         if (!alone[v])
-            order.push_back(v);
+            others.push_back(v);
+    return others;
+}
+
+/// Adds those that have the place of another one and may move.
+void Mesher::add_in_one_place(Vertices order, Vertices& hit) const {
+    std::erase_if(order, [&](std::uint32_t v) { return around(v).empty(); });
+    const double least_m = kLeastApart_vox * points_.voxel_m();
     const auto key = [&](std::uint32_t v) {
         const Vec3& p = mesh_.positions[v];
         return std::tuple(p.x, p.y, p.z, v);
     };
     std::sort(order.begin(), order.end(),
               [&](std::uint32_t a, std::uint32_t b) { return key(a) < key(b); });
-    Vertices hit;
     for (std::size_t i = 0; i < order.size(); ++i) {
         const Vec3& p = mesh_.positions[order[i]];
         for (std::size_t k = i + 1; k < order.size(); ++k) {
@@ -324,10 +362,11 @@ Mesher::Vertices Mesher::in_one_place() const {
                 break;
             if (p == q ||
                 (length_squared(q - p) < least_m * least_m && !share_polygon(order[i], order[k])))
-                hit.insert(hit.end(), {order[i], order[k]});
+                for (const std::uint32_t v : {order[i], order[k]})
+                    if (may_move(v))
+                        hit.push_back(v);
         }
     }
-    return hit;
 }
 
 bool Mesher::share_polygon(std::uint32_t v, std::uint32_t w) const {

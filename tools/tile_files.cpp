@@ -1,5 +1,8 @@
 #include "tools/tile_files.h"
 
+#include "mesh_out/tile_mesh.h"
+#include "stats/core/error.h"
+
 namespace taihu {
 
 void TileOptions::add_option(CLI::App& verb) {
@@ -36,6 +39,40 @@ nlohmann::ordered_json tiles_result(const std::filesystem::path& folder, const T
         json["bubbles_filled_m3"] = made.cleaned->filled_m3;
     }
     return json;
+}
+
+bool is_tile_set(const std::filesystem::path& path) {
+    return path.filename() == kTileSetName;
+}
+
+nlohmann::ordered_json mesh_tiles(const std::filesystem::path& set,
+                                  const std::filesystem::path& out, const Console& console) {
+    if (out.extension() != ".ply")
+        throw Error(Fault::unsupported,
+                    out.string() + ": the mesh of tiles is written as .ply; name it so");
+    console.may_write(out, {set});
+    const TileMeshResult made = write_tile_mesh(set, out, {}, console.progress);
+    console.say("{}: {}: {} triangles of {} tiles, {} piece{}, genus {}, {:.4g} m^3, {} "
+                "self-intersection{}",
+                out.string(), made.holds() ? "closed 2-manifold" : "not a closed 2-manifold",
+                made.n_triangles, made.n_tiles, made.n_components,
+                made.n_components == 1 ? "" : "s", made.genus, made.volume_m3,
+                made.n_self_intersections, made.n_self_intersections == 1 ? "" : "s");
+    return {{"file", out.string()},
+            {"bytes", made.n_bytes},
+            {"tiles", made.n_tiles},
+            {"certificate",
+             {{"holds", made.holds()},
+              {"vertices", made.n_vertices},
+              {"triangles", made.n_triangles},
+              {"boundary_edges", made.n_boundary_edges},
+              {"nonmanifold_vertices", made.n_nonmanifold_vertices},
+              {"degenerate_faces", made.n_degenerate_faces},
+              {"components", made.n_components},
+              {"genus", made.genus},
+              {"self_intersections", made.n_self_intersections},
+              {"volume_m3", made.volume_m3},
+              {"area_m2", made.area_m2}}}};
 }
 
 } // namespace taihu

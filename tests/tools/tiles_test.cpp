@@ -44,6 +44,26 @@ TEST(TileCommands, ARecipeInTilesIsTheWhole) {
     EXPECT_GT(result("taihu measure tiles/" + tile, folder)["volume_m3"], 0);
 }
 
+TEST(TileCommands, AMeshOfTilesIsOneClosedSurface) {
+    const Scratch folder;
+    must("taihu rock --preset sponge --dim 150 --seed 7 --tiles 128 -o tiles", folder);
+    const json made = result("taihu mesh tiles/tiles.json -o rock.ply", folder)["certificate"];
+    EXPECT_TRUE(made["holds"]);
+    EXPECT_EQ(made["self_intersections"], 0);
+    const json seen = result("taihu check rock.ply", folder);
+    const json& one = seen["levels"][0];
+    for (const char* key : {"holds", "vertices", "triangles", "components", "genus"})
+        EXPECT_EQ(made[key], one[key]) << key;
+    EXPECT_NEAR(made["volume_m3"], one["volume_m3"], 1e-9);
+    const Finished simpler =
+        run("taihu mesh tiles/tiles.json --max-error 1mm -o a.ply", folder.path());
+    EXPECT_EQ(simpler.exit_code, 2);
+    EXPECT_THAT(simpler.err, HasSubstr("not simplified; drop --max-error"));
+    const Finished other = run("taihu mesh tiles/tiles.json -o a.glb", folder.path());
+    EXPECT_EQ(other.exit_code, 1);
+    EXPECT_THAT(other.err, HasSubstr("is written as .ply"));
+}
+
 TEST(TileCommands, HolesCarvedInTilesAreThoseOfTheWhole) {
     const Scratch folder;
     must("taihu shape sphere --dim 150 -o base.vdb -q", folder);
