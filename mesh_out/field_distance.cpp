@@ -20,7 +20,8 @@ namespace {
 constexpr double kOn = 1e-3;        ///< of the spacing: on the surface
 constexpr double kFarthest = 8;     ///< spacings that a projection may take
 constexpr std::size_t kChunk = 512; ///< faces or points that are summed together
-constexpr double kClose = 0.65;     ///< of the limit: looked at more closely
+constexpr double kClose = 0.7;      ///< of the limit: looked at more closely
+constexpr int kParts = 3;           ///< of an edge then
 constexpr int kFinest = 64;         ///< parts of an edge
 
 /// The nearest point of the surface that can be reached by projecting onto the primitive that
@@ -173,9 +174,16 @@ FieldDistance field_distance(const TriMesh& mesh, const FieldProbe& field, const
             return;
         const Vec3 a = surface.positions[t[0]], b = surface.positions[t[1]],
                    c = surface.positions[t[2]];
-        for (const Vec3& p : {(a + b) / 2, (b + c) / 2, (c + a) / 2, (a + b + c) / 3})
-            if (const auto y = surface_point(field, p, spacing_m))
-                sum.add(*y, to_mesh(*y), limit_m, apart);
+        for (int u = 0; u <= kParts; ++u)
+            for (int v = 0; u + v <= kParts; ++v) {
+                if (u == kParts || v == kParts || u + v == 0)
+                    continue; // a corner
+                const Vec3 p = a + (b - a) * (double(u) / kParts) + (c - a) * (double(v) / kParts);
+                if (!(to_mesh(p) > kClose * limit_m))
+                    continue;
+                if (const auto y = surface_point(field, p, spacing_m))
+                    sum.add(*y, to_mesh(*y), limit_m, apart);
+            }
     }));
     FieldDistance result;
     result.max_to_field_m = there.most;

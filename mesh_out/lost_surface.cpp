@@ -18,7 +18,6 @@ constexpr int kDim = Leaf::DIM;
 constexpr float kNear = 0.8660254f;   ///< voxels: half the diagonal of one
 constexpr float kBent = 0.35f;        ///< voxels, from a straight line through three values
 constexpr float kOffSlope = 0.06f;    ///< of differences, from 1
-constexpr double kOther_vox = 0.1;    ///< between a field's value and that of a voxel
 constexpr double kNearPart_vox = 0.5; ///< the same of an eighth of a voxel, and some more
 constexpr double kFarthest_vox = 1;   ///< that a point may be from where it was looked for
 constexpr double kOn_vox = 1e-4;      ///< on the surface
@@ -35,11 +34,12 @@ public:
                     all_[i++] = in.getValue(origin.offsetBy(x, y, z)) * per_m;
     }
 
-    bool is_near(int x, int y, int z) const { return std::fabs(at(x, y, z)) <= kNear; }
-    /// Whether there seems to be more than one smooth sheet near a voxel: of one, differences have
-    /// the length 1 but for the square of its curvature.
+    /// Whether the surface comes near a voxel, and there seems to be more than one smooth sheet of
+    /// it: of one, differences have the length 1 but for the square of its curvature.
     bool bends(int x, int y, int z) const {
         const float own = at(x, y, z);
+        if (!(std::fabs(own) <= kNear))
+            return false;
         float slope2 = 0, bent = 0;
         for (const auto& [i, j, k] : {std::array{1, 0, 0}, {0, 1, 0}, {0, 0, 1}}) {
             const float more = at(x + i, y + j, z + k), less = at(x - i, y - j, z - k);
@@ -49,12 +49,11 @@ public:
         return bent > kBent || std::fabs(slope2 - 1) > 2 * kOffSlope;
     }
 
+private:
+    static constexpr int kSide = kDim + 2;
     float at(int x, int y, int z) const {
         return all_[static_cast<std::size_t>(((x + 1) * kSide + y + 1) * kSide + z + 1)];
     }
-
-private:
-    static constexpr int kSide = kDim + 2;
     std::array<float, kSide * kSide * kSide> all_{};
 };
 
@@ -65,11 +64,6 @@ public:
            double least_m)
         : field_(field), extracted_(extracted), voxel_m_(voxel_m), least_m_(least_m) {}
 
-    /// Whether the field has another value than the level set, which was made a distance from
-    /// what the voxels see: a slit beside a lattice point.
-    bool differs(const Vec3& p, double value_vox) const {
-        return std::fabs(field_.at(p).value_m / voxel_m_ - value_vox) > kOther_vox;
-    }
     /// On every primitive near `p`, or where those meet that cut off its nearest point.
     void seek(const Vec3& p) {
         if (std::fabs(field_.at(p).value_m) > kNearPart_vox * voxel_m_)
@@ -121,15 +115,11 @@ std::vector<Vec3> lost_surface(const openvdb::FloatGrid& solid, const FieldProbe
         for (int x = 0; x < kDim; ++x)
             for (int y = 0; y < kDim; ++y)
                 for (int z = 0; z < kDim; ++z) {
-                    if (!halo.is_near(x, y, z))
+                    if (!halo.bends(x, y, z))
                         continue;
                     const Vec3 at{double(origin.x() + x), double(origin.y() + y),
                                   double(origin.z() + z)};
-                    if (!halo.bends(x, y, z) &&
-                        ((x + y + z) % 2 == 0 ||
-                         !seeker.differs(lattice.origin + at * lattice.voxel_m,
-                                         double(halo.at(x, y, z)))))
-                        continue;
+                    seeker.seek(lattice.origin + at * lattice.voxel_m);
                     for (int part = 0; part < 8; ++part)
                         seeker.seek(lattice.origin +
                                     (at + Vec3{part & 1 ? .25 : -.25, part & 2 ? .25 : -.25,
