@@ -1,4 +1,4 @@
-#include "mesh_out/relief_around.h"
+#include "vdb_ops/relief_around.h"
 
 #include <cmath>
 #include <memory>
