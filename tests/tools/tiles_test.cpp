@@ -26,7 +26,7 @@ std::string tiles_hash(const std::filesystem::path& folder) {
 
 TEST(TileCommands, ARecipeInTilesIsTheWhole) {
     const Scratch folder;
-    const std::string rock = "taihu rock --preset sponge --dim 150 --height 1.8m --seed 7 ";
+    const std::string rock = "taihu rock --preset swiss_cheese --dim 150 --height 1.8m --seed 7 ";
     must(rock + "-o whole.vdb -q", folder);
     const json made = result(rock + "--tiles 128 -o tiles", folder);
     EXPECT_GT(made["tiles"], 1);
