@@ -22,6 +22,21 @@ std::string node(const char* kind, Json body) {
     return out.dump();
 }
 
+Json maps_json(const RecipeMaps& maps) {
+    Json json = {{"size_px", maps.side_px}, {"gutter_px", maps.gutter_px}, {"rays", maps.n_rays}};
+    if (maps.cage_m)
+        json["cage_m"] = *maps.cage_m;
+    if (maps.grain_m > 0) {
+        json["grain_m"] = maps.grain_m;
+        json["grain_contrast"] = maps.grain_contrast;
+    }
+    if (maps.only)
+        json["only"] = *maps.only;
+    if (maps.vertices)
+        json["vertices"] = true;
+    return json;
+}
+
 Json lod_json(const RecipeLod& lod) {
     Json json;
     if (lod.uniform())
@@ -34,6 +49,8 @@ Json lod_json(const RecipeLod& lod) {
         json["openness"] = false;
     if (lod.at_foot)
         json["origin"] = "foot";
+    if (lod.maps)
+        json["maps"] = maps_json(*lod.maps);
     return json;
 }
 
