@@ -22,6 +22,7 @@ namespace {
 
 constexpr double kSmooth_deg = 30; ///< edges of the fine mesh that turn by less are no creases
 constexpr double kFarApart = 0.25; ///< farthest that they are taken to lie apart / the longest axis
+constexpr double kMostApart = 2;   ///< likewise, where a cage is given
 constexpr double kSamplesAlong = 512;
 constexpr double kCageMargin = 1.1; ///< of a distance that was sampled
 
@@ -80,15 +81,16 @@ std::pair<TriMesh, PositionGrid> read_low(const BakePair& pair, const Console& c
 
 /// How far from the low mesh the other is sought: as far as they are measured to lie apart.
 double cage_m(const BakePair& pair, const High& high, const TwoSidedDistance& apart) {
-    if (!pair.cage.empty())
-        return length_m("--cage", pair.cage, high.measure);
-    if (apart.max_m > kFarApart * high.measure.longest_m)
+    const bool given = !pair.cage.empty();
+    const double most = given ? kMostApart : kFarApart;
+    if (apart.max_m > most * high.measure.longest_m)
         throw Error(Fault::bad_argument,
                     fmt::format("{}: lies up to {:.3g} m off {}, which is {:.3g} m long; put both "
                                 "in one place (--unit, --up), or say how far to look (--cage)",
                                 pair.low.string(), apart.max_m, pair.high.path.string(),
                                 high.measure.longest_m));
-    return kCageMargin * apart.max_m + high.measure.voxel_m;
+    return given ? length_m("--cage", pair.cage, high.measure)
+                 : kCageMargin * apart.max_m + high.measure.voxel_m;
 }
 
 void tell(const std::string& where, const BakedLevel& baked, const Certificate& certificate,

@@ -199,6 +199,7 @@ TEST_F(Bake, PairsThatLieApartAreRefusedUnlessACageIsGiven) {
         EXPECT_EQ(std::count(said.err.begin(), said.err.end(), '\n'), 1) << said.err;
     };
     refuses("far.obj --size 64 --ao-rays 4 -q -o far.glb", "put both in one place (--unit, --up)");
+    refuses("far.obj --cage 1m --size 64 --ao-rays 4 -q -o far.glb", "put both in one place");
     const json made = result("taihu bake rock.vdb far.obj --unit mm --size 64 --ao-rays 4 "
                              "--cage 10cm -o near.glb",
                              scratch_);
