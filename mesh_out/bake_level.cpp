@@ -1,5 +1,6 @@
 #include "mesh_out/bake_level.h"
 
+#include <algorithm>
 #include <utility>
 #include <vector>
 
@@ -97,7 +98,8 @@ BakedLevel bake_mesh(const TriMesh& given, const PositionGrid& grid, const BakeS
     ChartAtlas atlas = coarse_enough(mesh, settings, progress);
     BakedLevel out = bake_atlas(atlas, grid, fine, settings, progress);
     // Texels that are small beside the bound may still be large beside the bends.
-    while (out.relit.mean_deg > kMostRelit_deg && 2 * atlas.side_px <= settings.side_px) {
+    const int most_px = std::max(settings.side_px, settings.most_side_px);
+    while (out.relit.mean_deg > kMostRelit_deg && 2 * atlas.side_px <= most_px) {
         atlas = chart_atlas(mesh, {.side_px = 2 * atlas.side_px, .gutter_px = settings.gutter_px},
                             progress);
         out = bake_atlas(atlas, grid, fine, settings, progress);

@@ -12,8 +12,10 @@ struct BakeLevelSettings {
     int side_px = 2048; ///< of the maps, 64..8192,
     double texel_m = 0; ///< halved while no texel is larger than this and normals come out within 5
                         ///< degrees; 0: as it is
-    int gutter_px = 3;  ///< around each chart, 1..16
-    double grain_m = 0; ///< as in BakeSettings
+    int most_side_px = 0; ///< doubled up to this while normals are more than 5 degrees off; 0:
+                          ///< up to side_px, where it was halved
+    int gutter_px = 3;    ///< around each chart, 1..16
+    double grain_m = 0;   ///< as in BakeSettings
     double grain_contrast = 0.4;
     bool occlusion = true; ///< an occlusion texture in the file
     bool masters = true;   ///< all maps, else those of the file alone

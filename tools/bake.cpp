@@ -86,9 +86,8 @@ void add_bake(CLI::App& app, Console& console) {
         ->required();
     verb->add_option("--size", args->maps.side_px,
                      "Side of the finest level's maps, 64..8192; others are halved as far as "
-                     "their bounds allow [pixels]")
-        ->check(CLI::Range(64, 8192))
-        ->capture_default_str();
+                     "their bounds allow [2048, 4096 where normals would be 5 degrees off; pixels]")
+        ->check(CLI::Range(64, 8192));
     verb->add_option("--gutter", args->maps.gutter_px, "Filled pixels around each chart, 1..16")
         ->check(CLI::Range(1, 16))
         ->capture_default_str();

@@ -133,7 +133,8 @@ nlohmann::ordered_json write_baked_pair(const BakePair& pair, const Console& con
     const double grain_m = pair.grain.empty() ? 0 : length_m("--grain", pair.grain, measure);
     BakedLevel baked = bake_mesh(low, grid, source,
                                  {.reach_m = reach_m,
-                                  .side_px = pair.maps.side_px,
+                                  .side_px = pair.maps.side_px.value_or(kSide_px),
+                                  .most_side_px = pair.maps.side_px.value_or(kMostSide_px),
                                   .gutter_px = pair.maps.gutter_px,
                                   .grain_m = grain_m,
                                   .grain_contrast = pair.maps.grain_contrast,

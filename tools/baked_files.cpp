@@ -62,8 +62,9 @@ struct Baker {
         const RecipeMaps& maps = *lod.maps;
         return bake_level(level, source,
                           {.reach_m = reach_m(level, lod, voxel_m),
-                           .side_px = maps.side_px,
+                           .side_px = maps.side_px.value_or(kSide_px),
                            .texel_m = texel_m,
+                           .most_side_px = maps.side_px.value_or(kMostSide_px),
                            .gutter_px = maps.gutter_px,
                            .grain_m = maps.grain_m,
                            .grain_contrast = maps.grain_contrast,

@@ -34,6 +34,9 @@ private:
     bool made_;
 };
 
+/// The side of maps where none is asked for, and how far it grows where normals want it.
+inline constexpr int kSide_px = 2048, kMostSide_px = 4096;
+
 /// The figures of a level's maps.
 nlohmann::ordered_json maps_json(const BakedLevel& baked);
 

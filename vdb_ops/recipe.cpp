@@ -23,7 +23,9 @@ std::string node(const char* kind, Json body) {
 }
 
 Json maps_json(const RecipeMaps& maps) {
-    Json json = {{"size_px", maps.side_px}, {"gutter_px", maps.gutter_px}, {"rays", maps.n_rays}};
+    Json json = {{"gutter_px", maps.gutter_px}, {"rays", maps.n_rays}};
+    if (maps.side_px)
+        json["size_px"] = *maps.side_px;
     if (maps.cage_m)
         json["cage_m"] = *maps.cage_m;
     if (maps.grain_m > 0) {

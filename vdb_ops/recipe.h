@@ -39,7 +39,7 @@ std::string clean_node(const std::string& of, const CleanSettings& settings);
 
 /// Maps of what levels lost, baked into a GLB.
 struct RecipeMaps {
-    int side_px = 2048;                ///< of the finest level's, 64..8192
+    std::optional<int> side_px = {};   ///< of the finest level's, 64..8192; absent: as needed
     int gutter_px = 3;                 ///< around each chart, 1..16
     int n_rays = 64;                   ///< of the occlusion map, 1..4096
     std::optional<double> cage_m = {}; ///< how far the fine surface is sought; absent: by the level

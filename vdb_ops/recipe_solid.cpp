@@ -93,7 +93,8 @@ RecipeMaps maps_of(const json& own, const std::string& where, double scale) {
             throw Error(Fault::bad_input, where + ": '" + key + "' must be a whole number");
         return static_cast<int>(value);
     };
-    maps.side_px = whole("size_px", 64, 8192, maps.side_px);
+    if (own.contains("size_px"))
+        maps.side_px = whole("size_px", 64, 8192, 0);
     maps.gutter_px = whole("gutter_px", 1, 16, maps.gutter_px);
     maps.n_rays = whole("rays", 1, 4096, maps.n_rays);
     if (own.contains("cage_m"))
