@@ -10,12 +10,16 @@ namespace taihu {
 struct BakeLevelSettings {
     double reach_m = 0; ///< cage, as in BakeSettings
     int side_px = 2048; ///< of the maps, 64..8192,
-    double texel_m = 0; ///< halved while no texel is larger than this; 0: as it is
-    int gutter_px = 3;  ///< around each chart, 1..16
-    double grain_m = 0; ///< as in BakeSettings
+    double texel_m = 0; ///< halved while no texel is larger than this and normals come out within 5
+                        ///< degrees; 0: as it is
+    int most_side_px = 0; ///< doubled up to this while normals are more than 5 degrees off; 0:
+                          ///< up to side_px, where it was halved
+    int gutter_px = 3;    ///< around each chart, 1..16
+    double grain_m = 0;   ///< as in BakeSettings
     double grain_contrast = 0.4;
     bool occlusion = true; ///< an occlusion texture in the file
     bool masters = true;   ///< all maps, else those of the file alone
+    bool vertices = false; ///< _CURVATURE and _DISPLACEMENT of each vertex, as the maps have them
 };
 
 /// A level with its texture, as the decoded file holds it.
@@ -34,6 +38,15 @@ struct BakedLevel {
 /// certificate.
 BakedLevel bake_level(const LodLevel& level, const BakeSource& fine,
                       const BakeLevelSettings& settings, Progress* progress = nullptr);
+
+/// The same of any mesh, closed or not, that has normals; nothing is asked of what is decoded.
+/// \param grid  that its positions lie on.
+BakedLevel bake_mesh(const TriMesh& mesh, const PositionGrid& grid, const BakeSource& fine,
+                     const BakeLevelSettings& settings, Progress* progress = nullptr);
+
+/// The surface of a solid, with normals, dense enough for openness at its vertices.
+TriMesh fine_surface(const openvdb::FloatGrid& solid, const Field& field,
+                     Progress* progress = nullptr);
 
 /// The fine surface of a solid, for all of its levels. \param field  what the solid was made of.
 /// \param n_rays  of the openness; 0: none is worked out, and all is open.

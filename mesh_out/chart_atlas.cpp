@@ -4,7 +4,9 @@
 #include <cmath>
 #include <limits>
 #include <numbers>
+#include <optional>
 #include <string>
+#include <utility>
 
 #include "mesh_out/charts_detail.h"
 #include "mesh_out/io/mesh_formats_detail.h"
@@ -14,6 +16,7 @@ namespace taihu {
 namespace {
 
 constexpr double kFinerThanTexel = 16; ///< texture points on a grid of at least so many a texel
+constexpr int kTurns = 12;             ///< within a quarter, of a chart that is packed
 constexpr double kLeastFacing = 0.1;   ///< of a normal, below which tangents lean no further
 
 [[noreturn]] void refuse(const std::string& what) {
@@ -53,8 +56,9 @@ public:
 
 private:
     void measure_faces();
-    void make_charts();
-    void pack();
+    void make_charts(bool grown);
+    /// \param n_turns  of a chart within a quarter that are tried.
+    void pack(int n_turns);
     void cut();
     void judge();
     TexturePoint texture_point(const Chart& chart, const Vec3& p) const;
@@ -64,6 +68,7 @@ private:
     Progress* progress_;
     std::vector<Vec3> normals_;
     std::vector<double> areas_m2_;
+    std::vector<std::array<std::uint32_t, 3>> neighbours_;
     ChartAtlas atlas_;
 };
 
@@ -79,21 +84,27 @@ void Builder::measure_faces() {
     }
 }
 
-void Builder::make_charts() {
-    const auto neighbours = face_neighbours(mesh_.triangles);
-    const auto directions = chart_directions(normals_, areas_m2_, neighbours, mesh_, settings_);
-    check_cancelled(progress_);
-    atlas_.chart_of = split_charts(mesh_, directions, neighbours, progress_);
-    const std::uint32_t n = 1 + *std::max_element(atlas_.chart_of.begin(), atlas_.chart_of.end());
-    atlas_.charts.resize(n);
-    for (std::size_t f = 0; f < directions.size(); ++f) {
-        Chart& chart = atlas_.charts[atlas_.chart_of[f]];
-        chart.direction = directions[f];
-        ++chart.n_triangles;
+void Builder::make_charts(bool grown) {
+    GrownCharts made;
+    if (grown) {
+        made = grow_charts(normals_, areas_m2_, neighbours_, mesh_, settings_, progress_);
+    } else {
+        const auto directions =
+            chart_directions(normals_, areas_m2_, neighbours_, mesh_, settings_);
+        check_cancelled(progress_);
+        made.of_face = split_charts(mesh_, directions, neighbours_, progress_);
+        made.directions.resize(1 + *std::max_element(made.of_face.begin(), made.of_face.end()));
+        for (std::size_t f = 0; f < directions.size(); ++f)
+            made.directions[made.of_face[f]] = direction_vector(directions[f]);
     }
+    atlas_.chart_of = std::move(made.of_face);
+    for (const Vec3& direction : made.directions)
+        atlas_.charts.emplace_back().direction = direction;
+    for (const std::uint32_t c : atlas_.chart_of)
+        ++atlas_.charts[c].n_triangles;
 }
 
-void Builder::pack() {
+void Builder::pack(int n_turns) {
     struct Range {
         double lo = std::numeric_limits<double>::infinity(), hi = -lo;
         void include(double x) {
@@ -101,32 +112,42 @@ void Builder::pack() {
             hi = std::max(hi, x);
         }
     };
-    std::vector<std::array<Range, 2>> ranges(atlas_.charts.size());
-    for (std::size_t f = 0; f < mesh_.triangles.size(); ++f) {
-        const auto [u, v] = projection(atlas_.charts[atlas_.chart_of[f]].direction);
-        auto& range = ranges[atlas_.chart_of[f]];
-        for (const std::uint32_t i : mesh_.triangles[f]) {
-            range[0].include(dot(mesh_.positions[i], u));
-            range[1].include(dot(mesh_.positions[i], v));
-        }
-    }
+    std::vector<std::vector<std::uint32_t>> corners(atlas_.charts.size());
+    for (std::size_t f = 0; f < mesh_.triangles.size(); ++f)
+        for (const std::uint32_t i : mesh_.triangles[f])
+            corners[atlas_.chart_of[f]].push_back(i);
     std::vector<ChartSize> sizes;
-    for (std::size_t c = 0; c < ranges.size(); ++c) {
+    for (std::size_t c = 0; c < corners.size(); ++c) {
         Chart& chart = atlas_.charts[c];
-        auto [u, v] = ranges[c];
         const Projection seen = projection(chart.direction);
-        chart.u_axis = seen.u_axis;
-        chart.v_axis = seen.v_axis;
-        if (v.hi - v.lo > u.hi - u.lo) { // lying charts waste less of their shelves
-            chart.u_axis = seen.v_axis;
-            chart.v_axis = -seen.u_axis;
-            const Range old_u = u;
-            u = v;
-            v = {-old_u.hi, -old_u.lo};
+        double least_m2 = std::numeric_limits<double>::infinity();
+        for (int turn = 0; turn < n_turns; ++turn) {
+            const double angle = turn * std::numbers::pi / 2 / n_turns;
+            const Vec3 u_axis = seen.u_axis * std::cos(angle) + seen.v_axis * std::sin(angle),
+                       v_axis = seen.v_axis * std::cos(angle) - seen.u_axis * std::sin(angle);
+            Range u, v;
+            for (const std::uint32_t i : corners[c]) {
+                u.include(dot(mesh_.positions[i], u_axis));
+                v.include(dot(mesh_.positions[i], v_axis));
+            }
+            const double width = u.hi - u.lo, height = v.hi - v.lo;
+            if (width * height >= least_m2)
+                continue;
+            least_m2 = width * height;
+            chart.u_axis = u_axis;
+            chart.v_axis = v_axis;
+            chart.u_m = u.lo;
+            chart.v_m = v.lo;
+            if (height > width) { // lying charts waste less of their shelves
+                chart.u_axis = v_axis;
+                chart.v_axis = -u_axis;
+                chart.u_m = v.lo;
+                chart.v_m = -u.hi;
+            }
+            if (sizes.size() == c)
+                sizes.emplace_back();
+            sizes[c] = {std::max(width, height), std::min(width, height)};
         }
-        chart.u_m = u.lo;
-        chart.v_m = v.lo;
-        sizes.push_back({u.hi - u.lo, v.hi - v.lo});
     }
     const auto shelves = pack_shelves(sizes, settings_.side_px, settings_.gutter_px);
     if (!shelves)
@@ -183,8 +204,7 @@ void Builder::cut() {
             if (!mesh_.openness.empty())
                 out.mesh.openness.push_back(mesh_.openness[source]);
             out.texture.push_back(texture_point(chart, mesh_.positions[source]));
-            out.tangents.push_back(
-                tangent(mesh_.normals[source], chart.v_axis, direction_vector(chart.direction)));
+            out.tangents.push_back(tangent(mesh_.normals[source], chart.v_axis, chart.direction));
         }
     }
 }
@@ -192,8 +212,7 @@ void Builder::cut() {
 void Builder::judge() {
     double area = 0, stretched = 0, image = 0;
     for (std::size_t f = 0; f < normals_.size(); ++f) {
-        const Vec3 d = direction_vector(atlas_.charts[atlas_.chart_of[f]].direction);
-        const double facing = dot(normals_[f], d);
+        const double facing = dot(normals_[f], atlas_.charts[atlas_.chart_of[f]].direction);
         atlas_.most_stretch = std::max(atlas_.most_stretch, 1 / facing);
         area += areas_m2_[f];
         image += areas_m2_[f] * facing;
@@ -207,9 +226,25 @@ void Builder::judge() {
 
 ChartAtlas Builder::build() {
     measure_faces();
-    make_charts();
-    check_cancelled(progress_);
-    pack();
+    neighbours_ = face_neighbours(mesh_.triangles);
+    std::optional<ChartAtlas> best;
+    std::optional<Error> why;
+    for (const bool grown : {false, true}) {
+        atlas_ = {};
+        make_charts(grown);
+        check_cancelled(progress_);
+        try {
+            pack(grown ? kTurns : 1);
+        } catch (const Error& e) { // no room for so many charts; the other way may make fewer
+            why = e;
+            continue;
+        }
+        if (!best || atlas_.texel_m < best->texel_m)
+            best = atlas_;
+    }
+    if (!best)
+        throw *why;
+    atlas_ = std::move(*best);
     cut();
     judge();
     return std::move(atlas_);

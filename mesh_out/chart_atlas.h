@@ -17,9 +17,9 @@ struct AtlasSettings {
     double merge_stretch = 3;
 };
 
-/// A part of a mesh that is seen whole from one of the six directions.
+/// A part of a mesh that is seen whole from one direction.
 struct Chart {
-    int direction = 0;       ///< +X -X +Y -Y +Z -Z
+    Vec3 direction;          ///< towards the one who sees it, of length 1
     Vec3 u_axis, v_axis;     ///< of the texture; cross(u_axis, v_axis) is the direction
     double u_m = 0, v_m = 0; ///< least along them, at the left and lower border
     int x_px = 0, y_px = 0, width_px = 0, height_px = 0; ///< without gutter, y from the top
@@ -37,11 +37,13 @@ struct ChartAtlas {
     double used_rel = 0;                 ///< share of the texture that images of faces cover
 };
 
-/// A texture for a mesh of any genus, projected along axes: charts are connected faces that look in
-/// one direction most, which stretches none more than sqrt(3) but those that joined a neighbour;
-/// split where faces of one overlap in projection (exact where positions lie on a grid of at most
-/// 24 bits), turned by a quarter where they are taller than wide, and packed in shelves. Directions
-/// follow normals smoothed over neighbours where that keeps sqrt(3).
+/// A texture for a mesh of any genus: charts are connected faces, projected along one direction,
+/// which stretches none more than sqrt(3) but those that joined a neighbour, and of which none
+/// overlap in projection; turned so that they lie in small boxes, and packed in shelves. Two ways
+/// are tried, and the one that leaves the smaller texels is taken: charts of the six axes
+/// (directions follow normals smoothed over neighbours where that keeps sqrt(3); overlaps are exact
+/// where positions lie on a grid of at most 24 bits), best where surfaces are large and even; and
+/// charts that grow from a face along a direction of their own, best where they bend a lot.
 ///
 /// Texture points lie on a grid of 1/16 texel or finer, so that Draco keeps them. Tangents: where
 /// the surface cuts the plane of u and direction, exact for the projection. The same atlas whatever

@@ -2,10 +2,11 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <numbers>
 #include <numeric>
 #include <tuple>
+
+#include "mesh_out/chart_plane_detail.h"
 
 namespace taihu {
 namespace {
@@ -88,82 +89,6 @@ std::vector<Vec3> smoothed(std::span<const Vec3> normals, std::span<const double
     return now;
 }
 
-struct Point {
-    double x = 0, y = 0;
-};
-using Corners = std::array<Point, 3>;
-
-/// Whether an edge of `a` has all of `b` on its outer side or on itself. Exact where coordinates
-/// are multiples of one step below 2^25 of it.
-bool parts(const Corners& a, const Corners& b) {
-    for (std::size_t k = 0; k < 3; ++k) {
-        const Point& p = a[k];
-        const Point& q = a[(k + 1) % 3];
-        if (std::all_of(b.begin(), b.end(), [&](const Point& r) {
-                return (q.x - p.x) * (r.y - p.y) - (q.y - p.y) * (r.x - p.x) <= 0;
-            }))
-            return true;
-    }
-    return false;
-}
-
-/// The projected faces of one chart while it grows, in cells.
-class Plane {
-public:
-    Plane(std::span<const Corners> faces) : faces_(faces) {
-        hi_ = {-lo_.x, -lo_.y};
-        for (const Corners& c : faces)
-            for (const Point& p : c) {
-                lo_ = {std::min(lo_.x, p.x), std::min(lo_.y, p.y)};
-                hi_ = {std::max(hi_.x, p.x), std::max(hi_.y, p.y)};
-            }
-        const double width = hi_.x - lo_.x, height = hi_.y - lo_.y;
-        // About a cell for each face, whatever the shape.
-        cell_ = std::max(std::sqrt(width * height / double(faces.size())),
-                         std::max(width, height) / double(faces.size() + 1));
-        n_x_ = 1 + static_cast<std::size_t>(width / cell_);
-        n_y_ = 1 + static_cast<std::size_t>(height / cell_);
-        cells_.resize(n_x_ * n_y_);
-    }
-
-    /// False, and nothing changes, where the face overlaps one that is there.
-    bool add(std::uint32_t face) {
-        bool free = true;
-        each_cell(face, [&](std::vector<std::uint32_t>& cell) {
-            for (std::size_t i = 0; free && i < cell.size(); ++i)
-                free = parts(faces_[face], faces_[cell[i]]) || parts(faces_[cell[i]], faces_[face]);
-        });
-        if (free)
-            each_cell(face, [&](std::vector<std::uint32_t>& cell) { cell.push_back(face); });
-        return free;
-    }
-    void clear(std::span<const std::uint32_t> added) {
-        for (const std::uint32_t face : added)
-            each_cell(face, [](std::vector<std::uint32_t>& cell) { cell.clear(); });
-    }
-
-private:
-    template <class Visit>
-    void each_cell(std::uint32_t face, Visit&& visit) {
-        const Corners& c = faces_[face];
-        const auto [x_lo, x_hi] = std::minmax({c[0].x, c[1].x, c[2].x});
-        const auto [y_lo, y_hi] = std::minmax({c[0].y, c[1].y, c[2].y});
-        const auto index = [&](double at, double lo, std::size_t n) {
-            return std::min(n - 1, static_cast<std::size_t>((at - lo) / cell_));
-        };
-        for (std::size_t y = index(y_lo, lo_.y, n_y_); y <= index(y_hi, lo_.y, n_y_); ++y)
-            for (std::size_t x = index(x_lo, lo_.x, n_x_); x <= index(x_hi, lo_.x, n_x_); ++x)
-                visit(cells_[y * n_x_ + x]);
-    }
-
-    std::span<const Corners> faces_;
-    Point lo_{std::numeric_limits<double>::infinity(), std::numeric_limits<double>::infinity()},
-        hi_;
-    double cell_ = 1;
-    std::size_t n_x_ = 1, n_y_ = 1;
-    std::vector<std::vector<std::uint32_t>> cells_;
-};
-
 } // namespace
 
 Vec3 direction_vector(int direction) {
@@ -172,21 +97,11 @@ Vec3 direction_vector(int direction) {
     return d;
 }
 
-Projection projection(int direction) {
-    switch (direction) {
-    case 0:
-        return {{0, 0, -1}, {0, 1, 0}};
-    case 1:
-        return {{0, 0, 1}, {0, 1, 0}};
-    case 2:
-        return {{1, 0, 0}, {0, 0, -1}};
-    case 3:
-        return {{1, 0, 0}, {0, 0, 1}};
-    case 4:
-        return {{1, 0, 0}, {0, 1, 0}};
-    default:
-        return {{-1, 0, 0}, {0, 1, 0}};
-    }
+Projection projection(const Vec3& direction) {
+    const bool level = std::fabs(direction.y) < 1 - 1e-12;
+    Vec3 v = level ? Vec3{0, 1, 0} : Vec3{0, 0, direction.y > 0 ? -1.0 : 1.0};
+    v = normalized(v - direction * dot(v, direction));
+    return {cross(v, direction), v};
 }
 
 std::vector<std::array<std::uint32_t, 3>> face_neighbours(std::span<const Triangle> triangles) {
@@ -264,17 +179,17 @@ std::vector<std::uint32_t> split_charts(const TriMesh& mesh,
         if (patch % 256 == 0)
             check_cancelled(progress);
         const std::vector<std::uint32_t>& faces = patches.faces[patch];
-        const auto [u, v] = projection(directions[faces.front()]);
-        std::vector<Corners> projected;
+        const auto [u, v] = projection(direction_vector(directions[faces.front()]));
+        std::vector<ChartPlane::Corners> projected;
         for (std::uint32_t i = 0; i < faces.size(); ++i) {
             place[faces[i]] = i;
-            Corners& c = projected.emplace_back();
+            ChartPlane::Corners& c = projected.emplace_back();
             for (std::size_t k = 0; k < 3; ++k) {
                 const Vec3& p = mesh.positions[mesh.triangles[faces[i]][k]];
                 c[k] = {dot(p, u), dot(p, v)};
             }
         }
-        Plane plane(projected);
+        ChartPlane plane(projected);
         for (std::uint32_t first = 0; first < faces.size(); ++first) {
             if (chart[faces[first]] != kNone)
                 continue;

@@ -23,8 +23,9 @@ std::vector<std::uint8_t> chart_directions(std::span<const Vec3> normals,
 struct Projection {
     Vec3 u_axis, v_axis;
 };
-/// Seen from outside with +Y up; on top and bottom v runs away from the one who looks along -Z.
-Projection projection(int direction);
+/// Axes across a direction, seen from outside with v as far upwards as it may be; on top and bottom
+/// it runs away from the one who looks along -Z.
+Projection projection(const Vec3& direction);
 Vec3 direction_vector(int direction);
 
 /// The chart of each triangle, numbered from 0: connected, of one direction, none with two faces
@@ -33,6 +34,19 @@ std::vector<std::uint32_t> split_charts(const TriMesh& mesh,
                                         std::span<const std::uint8_t> directions,
                                         std::span<const std::array<std::uint32_t, 3>> neighbours,
                                         Progress* progress);
+
+/// Charts of directions of their own.
+struct GrownCharts {
+    std::vector<std::uint32_t> of_face; ///< numbered from 0: connected, none overlapping itself
+    std::vector<Vec3> directions;       ///< of length 1
+};
+
+/// Where a surface bends much, six directions cut it into many charts; these grow from a face, as
+/// far as no face is stretched more than sqrt(3) along what the first ones look in on average. Tiny
+/// ones join as in chart_directions().
+GrownCharts grow_charts(std::span<const Vec3> normals, std::span<const double> areas,
+                        std::span<const std::array<std::uint32_t, 3>> neighbours,
+                        const TriMesh& mesh, const AtlasSettings& settings, Progress* progress);
 
 /// Width and height of a chart [m].
 struct ChartSize {

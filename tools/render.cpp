@@ -5,14 +5,14 @@
 #include <cmath>
 
 #include "mesh_out/extract.h"
-#include "mesh_out/io/exr_file.h"
 #include "mesh_out/io/image_file.h"
-#include "mesh_out/relief_around.h"
+#include "mesh_out/io/relief_file.h"
 #include "stats/core/error.h"
 #include "stats/core/text.h"
 #include "tools/solid_files.h"
 #include "tools/units.h"
 #include "vdb_ops/relief.h"
+#include "vdb_ops/relief_around.h"
 #include "vdb_ops/vdb_file.h"
 
 namespace taihu {
@@ -68,25 +68,16 @@ template <class Value>
 std::shared_ptr<const ReliefAround>
 tile_around(const RenderArgs& args, const std::filesystem::path& path, const char* channel,
             const Box& frame, Value&& value) {
-    const std::vector<std::string> wanted = {channel};
-    ExrImage exr = read_exr(path, wanted);
-    std::optional<double> pixel_m;
-    bool tileable = false;
-    for (const auto& [key, text] : exr.attributes) {
-        if (key == "pixel_m")
-            pixel_m = parse_number(text);
-        if (key == "wrap")
-            tileable = text == "periodic";
-    }
+    ReliefTile tile = read_relief(path, channel);
     if (!args.tile_side.empty())
-        pixel_m = length_m("--tile-side", args.tile_side, {0, frame.longest()}) /
-                  std::max(1, exr.image.width - !tileable);
-    if (!pixel_m)
+        tile.pixel_m = length_m("--tile-side", args.tile_side, {0, frame.longest()}) /
+                       std::max(1, tile.heights.width - !tile.tileable);
+    if (!(tile.pixel_m > 0))
         throw Error(Fault::bad_input, path.string() + ": does not say how large it is; give "
                                                       "--tile-side");
-    for (float& p : exr.image.pixels)
+    for (float& p : tile.heights.pixels)
         p = static_cast<float>(value(p));
-    return std::make_shared<ReliefAround>(std::move(exr.image), *pixel_m, tileable,
+    return std::make_shared<ReliefAround>(std::move(tile.heights), tile.pixel_m, tile.tileable,
                                           map_of(args.around), frame);
 }
 

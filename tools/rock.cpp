@@ -3,6 +3,7 @@
 #include "stats/core/file.h"
 #include "stats/core/text.h"
 #include "stats/io/holes_file.h"
+#include "tools/baked_files.h"
 #include "tools/level_files.h"
 #include "tools/presets.h"
 #include "tools/solid_files.h"
@@ -152,6 +153,9 @@ nlohmann::ordered_json write_rock(const RockArgs& args, const RecipeSolid& made,
                                   const Console& console) {
     const bool by_recipe = made.lod && !args.surface.any() && !is_vdb(args.out);
     if (by_recipe && !made.lod->uniform() && mesh_format(args.out) == MeshFormat::glb) {
+        if (made.lod->maps)
+            return write_baked({.out = args.out, .maps = {}, .report = args.report}, made.solid,
+                               made.field, *made.lod, made.recipe, console);
         LevelFiles files{.out = args.out, .report = args.report};
         return write_levels(files, *made.solid, made.field.get(), *made.lod, made.recipe, console);
     }

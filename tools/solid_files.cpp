@@ -3,6 +3,7 @@
 #include <map>
 
 #include "mesh_out/extract.h"
+#include "mesh_out/io/relief_file.h"
 #include "stats/core/error.h"
 #include "stats/core/file.h"
 #include "stats/core/sha256.h"
@@ -110,7 +111,8 @@ RecipeAssets recipe_assets(std::vector<std::filesystem::path> folders, const Con
             [&console](const std::filesystem::path& file, double unit_m, bool z_up) {
                 return read_mesh(file, {unit_m, z_up ? UpAxis::z : UpAxis::y}, console.progress)
                     .levels.front();
-            }};
+            },
+            read_relief};
 }
 
 Solid read_solid(const SolidOptions& options, const Console& console, Surfaces surfaces) {

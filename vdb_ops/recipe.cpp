@@ -22,6 +22,23 @@ std::string node(const char* kind, Json body) {
     return out.dump();
 }
 
+Json maps_json(const RecipeMaps& maps) {
+    Json json = {{"gutter_px", maps.gutter_px}, {"rays", maps.n_rays}};
+    if (maps.side_px)
+        json["size_px"] = *maps.side_px;
+    if (maps.cage_m)
+        json["cage_m"] = *maps.cage_m;
+    if (maps.grain_m > 0) {
+        json["grain_m"] = maps.grain_m;
+        json["grain_contrast"] = maps.grain_contrast;
+    }
+    if (maps.only)
+        json["only"] = *maps.only;
+    if (maps.vertices)
+        json["vertices"] = true;
+    return json;
+}
+
 Json lod_json(const RecipeLod& lod) {
     Json json;
     if (lod.uniform())
@@ -34,6 +51,8 @@ Json lod_json(const RecipeLod& lod) {
         json["openness"] = false;
     if (lod.at_foot)
         json["origin"] = "foot";
+    if (lod.maps)
+        json["maps"] = maps_json(*lod.maps);
     return json;
 }
 

@@ -37,13 +37,26 @@ std::string holes_node(const std::string& name, const std::string& sha256,
 std::string difference_node(const std::string& of, const std::string& minus);
 std::string clean_node(const std::string& of, const CleanSettings& settings);
 
+/// Maps of what levels lost, baked into a GLB.
+struct RecipeMaps {
+    std::optional<int> side_px = {};   ///< of the finest level's, 64..8192; absent: as needed
+    int gutter_px = 3;                 ///< around each chart, 1..16
+    int n_rays = 64;                   ///< of the occlusion map, 1..4096
+    std::optional<double> cage_m = {}; ///< how far the fine surface is sought; absent: by the level
+    double grain_m = 0;                ///< of the grains of a colour map; 0: none
+    double grain_contrast = 0.4;       ///< 0..1
+    std::optional<int> only = {};      ///< this level alone has them, 0..7
+    bool vertices = false;             ///< curvature and displacement at each vertex, too
+};
+
 /// How a recipe's surface is written; meshes other than GLB are its first level.
 struct RecipeLod {
     std::vector<double> bounds_m = {};         ///< of each level, finest first, or
     std::vector<std::uint64_t> triangles = {}; ///< how many each has, or neither:
     bool uniform() const { return bounds_m.empty() && triangles.empty(); } ///< the plain extraction
-    bool openness = true; ///< ambient occlusion in a GLB's vertex colours
-    bool at_foot = false; ///< the origin is moved to the middle of the foot
+    bool openness = true;                ///< ambient occlusion in a GLB's vertex colours
+    bool at_foot = false;                ///< the origin is moved to the middle of the foot
+    std::optional<RecipeMaps> maps = {}; ///< of levels in a GLB
 };
 
 /// The whole recipe. \param voxel_m  of the lattice.

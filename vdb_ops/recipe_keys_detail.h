@@ -2,6 +2,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
+#include <filesystem>
 #include <initializer_list>
 #include <memory>
 #include <string>
@@ -98,10 +99,14 @@ std::vector<std::unique_ptr<RecipeNode>> parse_children(const Keys& keys, Recipe
                                                         std::size_t at_least);
 /// A node's own seed, or one that follows from the recipe's.
 std::uint64_t seed_of(const Keys& keys, RecipeParser& parser);
+/// The file that `key` names, in a folder of the recipe's, with the hash that `sha256` says.
+std::filesystem::path file_of(const Keys& keys, const char* key, const RecipeParser& parser);
 
 // Nodes of recipe_rough.cpp.
 std::unique_ptr<RecipeNode> parse_rough(const nlohmann::json& body, const std::string& where,
                                         RecipeParser& parser);
+std::unique_ptr<RecipeNode> parse_relief_node(const nlohmann::json& body, const std::string& where,
+                                              RecipeParser& parser);
 std::unique_ptr<RecipeNode> parse_warp(const nlohmann::json& body, const std::string& where,
                                        RecipeParser& parser);
 std::unique_ptr<RecipeNode> parse_weather(const nlohmann::json& body, const std::string& where,

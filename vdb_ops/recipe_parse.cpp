@@ -29,32 +29,6 @@ constexpr std::uint32_t kSeedStream = 0x72637065;
 constexpr double kMost_m = kMostLength_m;
 constexpr double kMostSeed = 1.8446744073709551e19;
 
-/// A file's content, which must have the hash that the recipe says.
-std::filesystem::path asset(const Keys& keys, const char* key, const RecipeParser& parser) {
-    const std::string name = keys.text(key), sha256 = keys.text("sha256");
-    if (name.empty() || name != base_name(name) || name == "." || name == "..")
-        refuse(keys.where(), "'" + std::string(key) + "' is '" + printable(name) +
-                                 "'; must be a name without folders");
-    for (const std::filesystem::path& folder : parser.assets.folders) {
-        const std::filesystem::path path = folder / name;
-        std::error_code ignored;
-        if (!std::filesystem::is_regular_file(path, ignored))
-            continue;
-        const std::string found = sha256_hex(read_file(path));
-        if (found != sha256)
-            refuse(keys.where(), "'" + name +
-                                     "' is another file than the one the recipe means "
-                                     "(its SHA-256 begins with " +
-                                     found.substr(0, 8) + ", not " +
-                                     printable(sha256.substr(0, 8)) +
-                                     "); find that one, or correct "
-                                     "sha256");
-        return path;
-    }
-    throw Error(Fault::io, keys.where() + ": there is no file '" + name +
-                               "' beside the recipe; put it there, or name its folder (--assets)");
-}
-
 FractalSettings fractal_of(const Keys& keys) {
     FractalSettings f;
     if (keys.has("base"))
@@ -134,7 +108,7 @@ Node parse_plane(const json& body, const std::string& where, RecipeParser&) {
 
 Node parse_mesh(const json& body, const std::string& where, RecipeParser& parser) {
     const Keys keys(body, where, {"file", "sha256"}, {"unit_m", "up", "close", "shells"});
-    const auto path = asset(keys, "file", parser);
+    const auto path = file_of(keys, "file", parser);
     const double unit_m = keys.number_or("unit_m", 1, 1e-9, 1e9);
     const bool z_up = keys.word("up", "y", "y", "z") == "z";
     const std::string rule = keys.word("close", "loops", "loops", "winding", "plane", "none");
@@ -150,7 +124,7 @@ Node parse_mesh(const json& body, const std::string& where, RecipeParser& parser
 
 Node parse_level_set(const json& body, const std::string& where, RecipeParser& parser) {
     const Keys keys(body, where, {"file", "sha256"});
-    return make_level_set_node(read_vdb(asset(keys, "file", parser)).solid);
+    return make_level_set_node(read_vdb(file_of(keys, "file", parser)).solid);
 }
 
 Node parse_combined(Combine how, const json& body, const std::string& where, RecipeParser& parser) {
@@ -219,7 +193,7 @@ Law parse_hole_law(const Keys& keys, RecipeParser& parser) {
                 json_number(parameters, body.where() + ".parameters", name, -1e12, 1e12));
         return Law(family, values);
     }
-    const LawFile file = read_law_file(asset(keys, "law", parser));
+    const LawFile file = read_law_file(file_of(keys, "law", parser));
     if (!keys.has("empirical") || keys.value("empirical") == false)
         return file.law;
     if (keys.value("empirical") != true)
@@ -273,7 +247,7 @@ Box parse_box(const Keys& keys) {
 Node parse_holes(const json& body, const std::string& where, RecipeParser& parser) {
     if (body.is_object() && body.contains("file")) {
         const Keys keys(body, where, {"file", "sha256"});
-        return make_holes_node(read_holes(asset(keys, "file", parser)));
+        return make_holes_node(read_holes(file_of(keys, "file", parser)));
     }
     const Keys keys(body, where, {"law"},
                     {"sha256", "empirical", "count", "porosity", "density_m3", "scale_m", "seed",
@@ -297,7 +271,7 @@ Node parse_holes(const json& body, const std::string& where, RecipeParser& parse
     }
     if (keys.has("where")) {
         const Keys file(keys.value("where"), where + ".where", {"file", "sha256"});
-        p.where = read_volume(asset(file, "file", parser));
+        p.where = read_volume(file_of(file, "file", parser));
     }
     std::optional<Box> box;
     if (keys.has("box_m"))
@@ -321,6 +295,7 @@ Node parse_material(const json& body, const std::string& where, RecipeParser& pa
 
 constexpr std::pair<std::string_view, Parse> kNodes[] = {
     {"rough", parse_rough},
+    {"relief", parse_relief_node},
     {"warp", parse_warp},
     {"weather", parse_weather},
     {"bites", parse_bites},
@@ -356,6 +331,31 @@ std::vector<Node> parse_children(const Keys& keys, RecipeParser& parser, std::si
         refuse(keys.where(), "'of' has " + std::to_string(nodes.size()) + " nodes; it needs " +
                                  (at_least == 1 ? "one" : std::to_string(at_least) + " or more"));
     return nodes;
+}
+
+std::filesystem::path file_of(const Keys& keys, const char* key, const RecipeParser& parser) {
+    const std::string name = keys.text(key), sha256 = keys.text("sha256");
+    if (name.empty() || name != base_name(name) || name == "." || name == "..")
+        refuse(keys.where(), "'" + std::string(key) + "' is '" + printable(name) +
+                                 "'; must be a name without folders");
+    for (const std::filesystem::path& folder : parser.assets.folders) {
+        const std::filesystem::path path = folder / name;
+        std::error_code ignored;
+        if (!std::filesystem::is_regular_file(path, ignored))
+            continue;
+        const std::string found = sha256_hex(read_file(path));
+        if (found != sha256)
+            refuse(keys.where(), "'" + name +
+                                     "' is another file than the one the recipe means "
+                                     "(its SHA-256 begins with " +
+                                     found.substr(0, 8) + ", not " +
+                                     printable(sha256.substr(0, 8)) +
+                                     "); find that one, or correct "
+                                     "sha256");
+        return path;
+    }
+    throw Error(Fault::io, keys.where() + ": there is no file '" + name +
+                               "' beside the recipe; put it there, or name its folder (--assets)");
 }
 
 std::uint64_t seed_of(const Keys& keys, RecipeParser& parser) {

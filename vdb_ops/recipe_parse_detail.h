@@ -16,6 +16,7 @@ struct RecipeParser {
     std::uint64_t seed = 0;                   ///< of the recipe
     const nlohmann::json* material = nullptr; ///< its hole material, or null
     std::uint64_t n_seeded = 0;               ///< nodes so far that took a seed from the recipe's
+    std::uint64_t n_tile_points = 0;          ///< of all height tiles so far
 
     /// The seed of a node that has none of its own.
     std::uint64_t next_seed();

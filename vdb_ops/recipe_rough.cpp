@@ -6,10 +6,11 @@
 #include "vdb_ops/placed_level_set_field.h"
 #include "vdb_ops/recipe_keys_detail.h"
 #include "vdb_ops/recipe_node_detail.h"
+#include "vdb_ops/relief.h"
 #include "vdb_ops/roughen.h"
 #include "vdb_ops/weather.h"
 
-// Nodes that work on the level set of what they are of: rough, warp, weather, bites.
+// Nodes that work on the level set of what they are of: rough, relief, warp, weather, bites.
 
 namespace taihu {
 namespace {
@@ -111,10 +112,82 @@ void check_relief_keys(const json& body, const std::string& where, Relief relief
         Keys(body, where, {"of", "amplitude_m", "largest_m"},
              {"relief", "along", "removes", "facing", "inside", "height", "seed"});
         break;
+    case Relief::tile: // a node of its own
+        break;
     }
 }
 
-Relief parse_relief(const Keys& keys) {
+/// Where there is more of it and where less. Heights of the solid are known later.
+void parse_shares(const Keys& keys, RoughenSettings& s) {
+    if (keys.has("facing")) {
+        const Vec3 f = keys.vector("facing", 0, 10);
+        s.facing = {f.x, f.y, f.z};
+    }
+    if (keys.has("inside")) {
+        const Keys in(keys.value("inside"), keys.where() + ".inside", {"mouth_m", "share"});
+        s.inside = InsideShare{in.number("mouth_m", 1e-9, 1e5), in.number("share", 0, 10)};
+    }
+    if (keys.has("height")) {
+        const auto [bottom, top] = keys.pair("height", 0, 10);
+        s.height = HeightShares{0, 1, bottom, top};
+    }
+}
+
+Node roughening(const Keys& keys, RecipeParser& parser, const RoughenSettings& s) {
+    return std::make_unique<LevelSetOperationNode>(
+        only_child(keys, parser),
+        [s](const openvdb::FloatGrid& solid, const Box& box, const Similarity& at,
+            const RecipeScene& scene) {
+            RoughenSettings own = s;
+            own.tile.frame = box;
+            if (own.height) {
+                own.height->bottom_m = box.lo.y;
+                own.height->top_m = box.hi.y;
+            }
+            return roughen(solid, own, at, scene.progress);
+        },
+        usual_growth_m(s), "roughening", keys.where());
+}
+
+/// Refuses more points than a recipe's tiles may have together: files are hostile.
+void count_points(std::uint64_t side_px, const Keys& keys, RecipeParser& parser) {
+    constexpr std::uint64_t kMostPoints = std::uint64_t{1} << 26;
+    parser.n_tile_points += side_px * side_px;
+    if (parser.n_tile_points > kMostPoints)
+        refuse(keys.where(), "the tiles of the recipe have more than 2^26 points; use smaller or "
+                             "fewer ones");
+}
+
+/// That of a file, or one made here.
+ReliefTile parse_tile(const Keys& keys, RecipeParser& parser) {
+    json body = keys.value("tile");
+    const std::string where = keys.where() + ".tile";
+    ReliefTile tile;
+    if (body.is_object() && body.contains("file")) {
+        const Keys file(body, where, {"file", "sha256"});
+        const auto path = file_of(file, "file", parser);
+        if (!parser.assets.read_relief)
+            refuse(where, "nothing here reads tiles; give what makes one, as {\"taihu_relief\": 1, "
+                          "\"law\": \"fractal\"}");
+        tile = parser.assets.read_relief(path);
+        count_points(static_cast<std::uint64_t>(std::max(tile.heights.width, tile.heights.height)),
+                     keys, parser);
+    } else {
+        if (body.is_object() && !body.contains("seed"))
+            body["seed"] = parser.next_seed();
+        ReliefSettings made = parse_relief(body.dump(), where);
+        made.n_colors = 0; // heights are all that is laid around
+        count_points(static_cast<std::uint64_t>(made.size_px), keys, parser);
+        tile = make_relief(made);
+    }
+    if (keys.has("side_m"))
+        tile.pixel_m = keys.length("side_m") / std::max(1, tile.heights.width - !tile.tileable);
+    if (!(tile.pixel_m > 0))
+        refuse(keys.where(), "the tile does not say how large it is; give 'side_m'");
+    return tile;
+}
+
+Relief parse_relief_name(const Keys& keys) {
     const std::string name = keys.word("relief", "fractal", "fractal", "furrows", "facets", "beds");
     return name == "furrows"  ? Relief::furrows
            : name == "facets" ? Relief::facets
@@ -129,7 +202,7 @@ Node parse_rough(const json& body, const std::string& where, RecipeParser& parse
                     {"relief", "smallest_m", "hurst", "along", "stretch", "removes", "sharpness",
                      "crack", "facing", "inside", "height", "seed"});
     RoughenSettings s;
-    s.relief = parse_relief(keys);
+    s.relief = parse_relief_name(keys);
     check_relief_keys(body, where, s.relief);
     s.amplitude_m = keys.number("amplitude_m", 0, 1e5);
     s.noise = parse_noise(keys, parser);
@@ -143,32 +216,29 @@ Node parse_rough(const json& body, const std::string& where, RecipeParser& parse
     s.removes = flag(keys, "removes");
     s.sharpness = keys.number_or("sharpness", s.sharpness, 0.25, 16);
     s.crack = keys.number_or("crack", s.crack, 0, 2);
-    if (keys.has("facing")) {
-        const Vec3 f = keys.vector("facing", 0, 10);
-        s.facing = {f.x, f.y, f.z};
-    }
-    if (keys.has("inside")) {
-        const Keys in(keys.value("inside"), where + ".inside", {"mouth_m", "share"});
-        s.inside = InsideShare{in.number("mouth_m", 1e-9, 1e5), in.number("share", 0, 10)};
-    }
-    std::optional<std::pair<double, double>> height;
-    if (keys.has("height"))
-        height = keys.pair("height", 0, 10);
-    if (height)
-        s.height = HeightShares{0, 1, height->first, height->second};
-    const double growth = usual_growth_m(s);
-    return std::make_unique<LevelSetOperationNode>(
-        only_child(keys, parser),
-        [s](const openvdb::FloatGrid& solid, const Box& box, const Similarity& at,
-            const RecipeScene& scene) {
-            RoughenSettings own = s;
-            if (own.height) {
-                own.height->bottom_m = box.lo.y;
-                own.height->top_m = box.hi.y;
-            }
-            return roughen(solid, own, at, scene.progress);
-        },
-        growth, "roughening", where);
+    parse_shares(keys, s);
+    return roughening(keys, parser, s);
+}
+
+Node parse_relief_node(const json& body, const std::string& where, RecipeParser& parser) {
+    const Keys keys(
+        body, where, {"of", "tile"},
+        {"amplitude_m", "side_m", "sharpness", "removes", "facing", "inside", "height"});
+    ReliefTile tile = parse_tile(keys, parser);
+    std::vector<float>& heights = tile.heights.pixels;
+    double most_m = 0;
+    for (const float h : heights)
+        most_m = std::max(most_m, std::fabs(static_cast<double>(h)));
+    for (float& h : heights)
+        h = most_m > 0 ? static_cast<float>(static_cast<double>(h) / most_m) : 0;
+    RoughenSettings s;
+    s.relief = Relief::tile;
+    s.amplitude_m = keys.number_or("amplitude_m", most_m, 0, 1e5);
+    s.tile.sharpness = keys.number_or("sharpness", s.tile.sharpness, 1, 64);
+    s.tile.tile = std::make_shared<const ReliefTile>(std::move(tile));
+    s.removes = flag(keys, "removes");
+    parse_shares(keys, s);
+    return roughening(keys, parser, s);
 }
 
 Node parse_warp(const json& body, const std::string& where, RecipeParser& parser) {

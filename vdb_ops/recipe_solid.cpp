@@ -80,15 +80,44 @@ bool json_flag(const json& object, const std::string& where, const std::string& 
     return object[key].get<bool>();
 }
 
+RecipeMaps maps_of(const json& own, const std::string& where, double scale) {
+    static constexpr std::string_view kKeys[] = {"size_px", "gutter_px",      "rays", "cage_m",
+                                                 "grain_m", "grain_contrast", "only", "vertices"};
+    check_keys(own, where, {}, kKeys);
+    RecipeMaps maps;
+    const auto whole = [&](const char* key, double lo, double hi, int otherwise) {
+        if (!own.contains(key))
+            return otherwise;
+        const double value = json_number(own, where, key, lo, hi);
+        if (value != std::floor(value))
+            throw Error(Fault::bad_input, where + ": '" + key + "' must be a whole number");
+        return static_cast<int>(value);
+    };
+    if (own.contains("size_px"))
+        maps.side_px = whole("size_px", 64, 8192, 0);
+    maps.gutter_px = whole("gutter_px", 1, 16, maps.gutter_px);
+    maps.n_rays = whole("rays", 1, 4096, maps.n_rays);
+    if (own.contains("cage_m"))
+        maps.cage_m = json_number(own, where, "cage_m", 1e-9, 1e6) * scale;
+    if (own.contains("grain_m"))
+        maps.grain_m = json_number(own, where, "grain_m", 1e-9, 1e6) * scale;
+    if (own.contains("grain_contrast"))
+        maps.grain_contrast = json_number(own, where, "grain_contrast", 0, 1);
+    if (own.contains("only"))
+        maps.only = whole("only", 0, kMostLevels - 1, 0);
+    maps.vertices = json_flag(own, where, "vertices", false);
+    return maps;
+}
+
 /// Exactly one of: `levels` with `bound_m` or `bound_vox` and `factor`, `bounds_m`, `triangles`,
 /// `uniform`.
 std::optional<RecipeLod> lod_of(const json& recipe, const std::string& where, double scale,
                                 double voxel_m) {
     if (!recipe.contains("lod"))
         return std::nullopt;
-    static constexpr std::string_view kKeys[] = {"levels",  "bound_m",  "bound_vox",
-                                                 "factor",  "bounds_m", "triangles",
-                                                 "uniform", "openness", "origin"};
+    static constexpr std::string_view kKeys[] = {"levels",   "bound_m",   "bound_vox", "factor",
+                                                 "bounds_m", "triangles", "uniform",   "openness",
+                                                 "origin",   "maps"};
     const std::string inside = where + ": lod";
     const json& own = recipe["lod"];
     check_keys(own, inside, {}, kKeys);
@@ -119,6 +148,13 @@ std::optional<RecipeLod> lod_of(const json& recipe, const std::string& where, do
         if (origin != "foot" && origin != "world")
             throw Error(Fault::bad_input, inside + ": 'origin' must be foot or world");
         lod.at_foot = origin == "foot";
+    }
+    if (own.contains("maps")) {
+        if (lod.uniform())
+            throw Error(Fault::bad_input,
+                        inside + ": 'maps' are of levels; give 'levels', 'bounds_m' or "
+                                 "'triangles' instead of 'uniform'");
+        lod.maps = maps_of(own["maps"], inside + ".maps", scale);
     }
     return lod;
 }

@@ -15,6 +15,7 @@
 #include "vdb_ops/estimate.h"
 #include "vdb_ops/field.h"
 #include "vdb_ops/recipe.h"
+#include "vdb_ops/relief.h"
 #include "vdb_ops/tiles.h"
 
 namespace taihu {
@@ -25,6 +26,8 @@ struct RecipeAssets {
     std::vector<std::filesystem::path> folders; ///< searched in turn
     /// Reads the finest level of a mesh file, in metres and with +Y up.
     std::function<TriMesh(const std::filesystem::path& file, double unit_m, bool z_up)> read_mesh;
+    /// Reads a height tile; pixel_m is 0 where the file does not say it.
+    std::function<ReliefTile(const std::filesystem::path& file)> read_relief = {};
 };
 
 /// What is to be other than the recipe says.

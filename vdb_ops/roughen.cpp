@@ -53,7 +53,13 @@ double least_m(const Lattice& lattice, const Similarity& at) {
 class Displacement {
 public:
     Displacement(const RoughenSettings& s, double least_m) : s_(s) {
-        if (s.relief == Relief::facets)
+        if (s.relief == Relief::tile)
+            tile_ = std::make_unique<ReliefAround>(
+                without_short_waves(s.tile.tile->heights, s.tile.tile->pixel_m,
+                                    s.tile.tile->tileable, least_m),
+                s.tile.tile->pixel_m, s.tile.tile->tileable, ReliefMap::triplanar, s.tile.frame,
+                s.tile.sharpness);
+        else if (s.relief == Relief::facets)
             cells_ = std::make_unique<CellNoise>(s.noise);
         else if (s.relief == Relief::beds)
             beds_ = std::make_unique<BedNoise>(s.noise);
@@ -91,6 +97,8 @@ private:
         }
         case Relief::beds:
             return beds_->at(p);
+        case Relief::tile:
+            return tile_->height_m(p, normal);
         case Relief::fractal:
             break;
         }
@@ -104,12 +112,19 @@ private:
     std::unique_ptr<FractalNoise> fractal_;
     std::unique_ptr<CellNoise> cells_;
     std::unique_ptr<BedNoise> beds_;
+    std::unique_ptr<ReliefAround> tile_;
 };
 
 } // namespace
 
 void check_roughen_settings(const RoughenSettings& s) {
-    check_noise(s.noise, "roughen");
+    if (s.relief != Relief::tile)
+        check_noise(s.noise, "roughen");
+    else if (!s.tile.tile ||
+             std::any_of(s.tile.tile->heights.pixels.begin(), s.tile.tile->heights.pixels.end(),
+                         [](float h) { return !(std::fabs(h) <= 1); }))
+        throw Error(Fault::bad_argument, "roughen: a tile needs heights within -1..1; divide them "
+                                         "by the greatest, and make that the amplitude");
     require(s.amplitude_m >= 0 && s.amplitude_m <= 1e5, "roughen: amplitude_m", s.amplitude_m,
             "0..1e5");
     if (s.hurst_down)
@@ -150,6 +165,7 @@ double greatest_share(const RoughenSettings& s) {
 double reach_m(const RoughenSettings& s) {
     const double most = s.relief == Relief::fractal   ? FractalNoise::kMost
                         : s.relief == Relief::furrows ? 1
+                        : s.relief == Relief::tile    ? 1
                         : s.relief == Relief::facets  ? 2 + s.crack
                                                       : 0.85;
     return most * greatest_share(s) * s.amplitude_m;
@@ -158,7 +174,8 @@ double reach_m(const RoughenSettings& s) {
 double usual_growth_m(const RoughenSettings& s) {
     if (s.removes || s.relief == Relief::furrows)
         return 0;
-    return (s.relief == Relief::fractal ? 2 : 0.5) * greatest_share(s) * s.amplitude_m;
+    const double usual = s.relief == Relief::fractal ? 2 : s.relief == Relief::tile ? 1 : 0.5;
+    return usual * greatest_share(s) * s.amplitude_m;
 }
 
 FloatGrid::Ptr roughen(const FloatGrid& solid, const RoughenSettings& s, const Similarity& at,

@@ -1,10 +1,13 @@
 #pragma once
+#include <memory>
 #include <optional>
 
 #include <openvdb/openvdb.h>
 
 #include "stats/core/progress.h"
 #include "vdb_ops/noise.h"
+#include "vdb_ops/relief.h"
+#include "vdb_ops/relief_around.h"
 #include "vdb_ops/similarity.h"
 
 namespace taihu {
@@ -14,7 +17,8 @@ enum class Relief {
     fractal, ///< FractalNoise, rms 1
     furrows, ///< grooves where FractalNoise::ridged() is high, 0..1 deep
     facets,  ///< CellNoise: a plane in each cell, slopes up to 1, cracks between
-    beds     ///< BedNoise: steps of layers, 0..0.5 up and down, grooves at the joints
+    beds,    ///< BedNoise: steps of layers, 0..0.5 up and down, grooves at the joints
+    tile     ///< heights of a tile laid around, -1..1
 };
 
 /// Shares of the amplitude where the surface looks up (+Y), sideways and down; straight between.
@@ -34,9 +38,17 @@ struct HeightShares {
     double bottom = 1, top = 1;     ///< 0..10
 };
 
+/// A height tile laid triplanar around a box.
+struct TileLayer {
+    std::shared_ptr<const ReliefTile> tile; ///< heights within -1..1, times the amplitude
+    Box frame;                              ///< the middle of the tile is over its middle
+    double sharpness = 4;                   ///< as ReliefAround
+};
+
 struct RoughenSettings {
     Relief relief = Relief::fractal;
-    NoiseSettings noise;
+    NoiseSettings noise;              ///< of all but a tile
+    TileLayer tile;                   ///< of a tile alone
     double amplitude_m = 0.01;        ///< rms of a fractal, depth of the rest, 0..1e5
     bool removes = false;             ///< what would stand out stays as it was; furrows always do
     std::optional<double> hurst_down; ///< of a fractal, where it faces down; noise.hurst: up
@@ -54,10 +66,11 @@ void check_roughen_settings(const RoughenSettings& settings);
 double reach_m(const RoughenSettings& settings);
 double usual_growth_m(const RoughenSettings& settings);
 
-/// A level set displaced along its normal by noise at the surface: rough stone. Each point takes
-/// the displacement of the nearest point of the surface, and the result is where the displaced
-/// distance is 0: a proper level set, which cannot cross itself, with true distances. Its H is that
-/// of the noise down to two voxels. Thin walls may break, and pieces come off: clean() afterwards.
+/// A level set displaced along its normal by noise or a tile at the surface: rough stone. Each
+/// point takes the displacement of the nearest point of the surface, and the result is where the
+/// displaced distance is 0: a proper level set, which cannot cross itself, with true distances. Its
+/// H is that of the noise or the tile down to two voxels. Thin walls may break, and pieces come
+/// off: clean() afterwards.
 ///
 /// \param at  where the solid was put: settings (lengths, places, directions) are of before.
 /// \return on the lattice and band of `solid`.

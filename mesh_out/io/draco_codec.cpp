@@ -5,6 +5,7 @@
 #include <memory>
 #include <new>
 #include <optional>
+#include <span>
 #include <stdexcept>
 
 #include <draco/compression/decode.h>
@@ -22,7 +23,8 @@
 namespace taihu {
 namespace {
 
-constexpr int kNormalBits = 10, kTangentBits = 8, kSpeed = 3, kMostTextureBits = 18;
+constexpr int kNormalBits = 10, kTangentBits = 8, kValueBits = 12, kSpeed = 3,
+              kMostTextureBits = 18;
 constexpr const char* kRecipeKey = "taihu_recipe";
 /// A stream may claim this many faces whatever its length, and 64 more for each of its bytes: far
 /// more than any real mesh has, and little enough to allocate.
@@ -160,6 +162,7 @@ void add_colours(draco::Mesh& mesh, const std::vector<float>& openness) {
 
 /// \param textured  the same mesh with its texture, or null.
 std::unique_ptr<draco::Mesh> to_draco(const TriMesh& mesh, const TexturedMesh* textured,
+                                      std::span<const VertexValues> values,
                                       const std::string& recipe) {
     auto made = std::make_unique<draco::Mesh>(); // it can be neither copied nor moved
     draco::Mesh& out = *made;
@@ -190,6 +193,9 @@ std::unique_ptr<draco::Mesh> to_draco(const TriMesh& mesh, const TexturedMesh* t
             return std::array{x, y, z, 1.0f};
         });
     }
+    for (const VertexValues& v : values)
+        add_floats<1>(out, draco::GeometryAttribute::GENERIC,
+                      [&](std::uint32_t i) { return std::array{v.values[i]}; });
     if (!recipe.empty()) {
         auto metadata = std::make_unique<draco::GeometryMetadata>();
         metadata->AddEntryString(kRecipeKey, recipe);
@@ -406,11 +412,11 @@ std::vector<TexturedFace> sorted_faces(const TexturedMesh& textured) {
 
 /// \param textured  the same mesh with its texture, or null.
 EncodedLevel encode(const TriMesh& mesh, const TexturedMesh* textured, const PositionGrid& grid,
-                    const std::string& recipe) {
+                    std::span<const VertexValues> values, const std::string& recipe) {
     check_writable(mesh, "encode_draco");
     const int exponent = check_on_grid(mesh, grid);
     const int bits = textured ? texture_bits(*textured) : 0;
-    const auto source = to_draco(mesh, textured, recipe);
+    const auto source = to_draco(mesh, textured, values, recipe);
     draco::ExpertEncoder encoder(*source);
     encoder.SetEncodingMethod(draco::MESH_EDGEBREAKER_ENCODING);
     encoder.SetSpeedOptions(kSpeed, kSpeed);
@@ -426,6 +432,8 @@ EncodedLevel encode(const TriMesh& mesh, const TexturedMesh* textured, const Pos
         encoder.options().SetAttributeOptions(static_cast<int>(draco_texture_id(mesh)), exact);
         encoder.SetAttributeQuantization(static_cast<int>(draco_tangent_id(mesh)), kTangentBits);
     }
+    for (std::size_t i = 0; i < values.size(); ++i)
+        encoder.SetAttributeQuantization(static_cast<int>(draco_values_id(mesh) + i), kValueBits);
     const auto give_up = [](const std::string& what) {
         throw Error(Fault::numeric, "encode_draco: " + what +
                                         "; give a closed 2-manifold whose vertices are all used");
@@ -464,17 +472,26 @@ EncodedLevel encode(const TriMesh& mesh, const TexturedMesh* textured, const Pos
 
 EncodedLevel encode_draco(const TriMesh& mesh, const PositionGrid& grid,
                           const std::string& recipe) {
-    return encode(mesh, nullptr, grid, recipe);
+    return encode(mesh, nullptr, grid, {}, recipe);
 }
 
-EncodedLevel encode_draco(const TexturedMesh& textured, const PositionGrid& grid) {
-    EncodedLevel level = encode(textured.mesh, &textured, grid, {});
+EncodedLevel encode_draco(const TexturedMesh& textured, const PositionGrid& grid,
+                          std::span<const VertexValues> values) {
+    for (const VertexValues& v : values)
+        if (v.values.size() != textured.mesh.positions.size() ||
+            !std::all_of(v.values.begin(), v.values.end(),
+                         [](float x) { return std::isfinite(x); }))
+            throw Error(Fault::bad_argument,
+                        "encode_draco: give " + v.name + " one finite value for each position");
+    EncodedLevel level = encode(textured.mesh, &textured, grid, values, {});
     TexturedMesh decoded = decode_textured_draco(level.draco, "encode_draco");
     if (sorted_faces(decoded) != sorted_faces(textured))
         throw Error(Fault::numeric, "encode_draco: a face came back with other texture points; "
                                     "give a closed 2-manifold whose vertices are all used");
     level.texture = std::move(decoded.texture);
     level.tangents = std::move(decoded.tangents);
+    for (const VertexValues& v : values)
+        level.values.push_back(v.name);
     return level;
 }
 

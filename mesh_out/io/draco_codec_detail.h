@@ -23,6 +23,11 @@ inline std::uint32_t draco_tangent_id(const TriMesh& mesh) {
     return draco_texture_id(mesh) + 1;
 }
 
+/// Of the first of the values that a level has beside; the others follow.
+inline std::uint32_t draco_values_id(const TriMesh& mesh) {
+    return draco_tangent_id(mesh) + 1;
+}
+
 /// A decoded mesh with the attribute ids that glTF refers to.
 struct DracoMesh {
     TriMesh mesh;

@@ -184,6 +184,11 @@ Json draco_primitive(Assembly& glb, const EncodedLevel& level, std::size_t mater
         primitive["attributes"]["TANGENT"] =
             glb.add_accessor(Assembly::describe_floats("VEC4", level.tangents.size()));
     }
+    for (std::size_t i = 0; i < level.values.size(); ++i) {
+        attributes[level.values[i]] = draco_values_id(mesh) + i;
+        primitive["attributes"][level.values[i]] =
+            glb.add_accessor(Assembly::describe_floats("SCALAR", mesh.positions.size()));
+    }
     primitive["extensions"]["KHR_draco_mesh_compression"] = {{"bufferView", view},
                                                              {"attributes", attributes}};
     return primitive;

@@ -79,6 +79,24 @@ TEST(SeedRow, D10LevelsRelitByTheirMapsAreNearerToTheFineSurface) {
         EXPECT_LT(baked().levels[j].maps.rms_displacement_m, baked().chain.levels[j].bound_m);
 }
 
+TEST(BakeLevel, MapsGrowWhereTexelsAreTooLargeForTheNormals) {
+    const double reach_m = 4 * kVoxel;
+    const auto grid = holed_ball_grid(1, kVoxel, kHoles);
+    const DifferenceField field(std::make_shared<BallsField>(std::vector<Sphere>{{{0, 0, 0}, 1}}),
+                                std::make_shared<BallsField>(kHoles));
+    const BakeSource fine = bake_source(*grid, field, reach_m, 0);
+    const LodLevel& level = baked().chain.levels[0];
+    const auto bake = [&](int most_side_px) {
+        return bake_level(level, fine,
+                          {.reach_m = reach_m, .side_px = 64, .most_side_px = most_side_px});
+    };
+    const BakedLevel small = bake(0), large = bake(512);
+    EXPECT_EQ(small.maps.normal.width, 64);
+    EXPECT_GT(small.relit.mean_deg, 5);
+    EXPECT_GT(large.maps.normal.width, 64);
+    EXPECT_LE(large.relit.mean_deg, 5);
+}
+
 TEST(BakeLevel, IsReadBackFromItsFile) {
     const std::string glb = format_glb(encoded());
     const MeshFile file = parse_mesh(glb, MeshFormat::glb, "rock.glb");

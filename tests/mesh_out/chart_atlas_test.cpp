@@ -191,9 +191,9 @@ TEST(ChartAtlas, IsClosedOnceEqualPositionsAreWelded) {
 TEST(ChartAtlas, OfACubeIsSixSquares) {
     const ChartAtlas atlas = chart_atlas(with_normals(cube()), {.side_px = 256});
     ASSERT_EQ(atlas.charts.size(), 6u);
-    std::set<int> directions;
+    std::set<std::array<double, 3>> directions;
     for (const Chart& chart : atlas.charts) {
-        directions.insert(chart.direction);
+        directions.insert({chart.direction.x, chart.direction.y, chart.direction.z});
         EXPECT_EQ(chart.width_px, chart.height_px);
     }
     EXPECT_EQ(directions.size(), 6u);
@@ -266,6 +266,28 @@ TEST(ChartAtlas, TangentsRunAlongGrowingU) {
 TEST(ChartAtlas, FillsItsTexture) {
     EXPECT_GT(chart_atlas(with_normals(icosphere(4)), {.side_px = 1024}).used_rel, 0.4);
     EXPECT_GT(chart_atlas(holed_ball(), {.side_px = 1024}).used_rel, 0.35);
+}
+
+TEST(ChartAtlas, OfAFoamHasLargeChartsOfDirectionsOfTheirOwn) {
+    std::vector<Sphere> bubbles;
+    const Rng rng{3, 1};
+    for (std::uint64_t i = 0; i < 260; ++i)
+        bubbles.push_back(
+            {{2 * rng.uniform(i, 0) - 1, 2 * rng.uniform(i, 1) - 1, 2 * rng.uniform(i, 2) - 1},
+             0.13 + 0.12 * rng.uniform(i, 3)});
+    const DifferenceField field(std::make_shared<BallsField>(std::vector<Sphere>{{{0, 0, 0}, 1}}),
+                                std::make_shared<BallsField>(bubbles));
+    const LabelledMesh foam = extract(*holed_ball_grid(1, 0.05, bubbles), &field);
+    const TriMesh mesh = with_normals({foam.positions, foam.triangles, {}});
+    const AtlasSettings settings{.side_px = 2048};
+    expect_invariants(mesh, settings);
+    const ChartAtlas atlas = chart_atlas(mesh, settings);
+    std::size_t n_slanted = 0;
+    for (const Chart& chart : atlas.charts)
+        n_slanted += std::max({std::fabs(chart.direction.x), std::fabs(chart.direction.y),
+                               std::fabs(chart.direction.z)}) < 0.999;
+    EXPECT_GT(2 * n_slanted, atlas.charts.size());
+    EXPECT_GT(atlas.used_rel, 0.3);
 }
 
 TEST(ChartAtlas, NamesWhatItCannotUse) {

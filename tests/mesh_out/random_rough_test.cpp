@@ -96,8 +96,20 @@ private:
                       {"chain", 1 + pick(3)},
                       {"begin", pick(2) == 0 ? "surface" : "inside"}}}};
         }
-        default:
-            return {{"rough", noise(std::move(solid))}};
+        default: {
+            const bool fractal = pick(2) == 0;
+            Json tile = {
+                {"taihu_relief", 1},
+                {"law", fractal ? "fractal" : "convex"},
+                {"size_px", 65},
+                {fractal ? "hurst" : "n_regions", fractal ? uniform(0.3, 1) : 1 + pick(30)}};
+            return {{"relief",
+                     {{"of", std::move(solid)},
+                      {"tile", std::move(tile)},
+                      {"amplitude_m", uniform(0.02, 0.1)},
+                      {"side_m", uniform(0.2, 1)},
+                      {"sharpness", uniform(1, 8)}}}};
+        }
         }
     }
 

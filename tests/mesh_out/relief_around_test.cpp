@@ -1,4 +1,4 @@
-#include "mesh_out/relief_around.h"
+#include "vdb_ops/relief_around.h"
 
 #include <cmath>
 #include <memory>
@@ -191,6 +191,7 @@ TEST(ReliefAround, RefusesWhatIsNoTile) {
     refused(Image(8, 8, 3), 0.1, kFrame, "3 channels");
     refused(Image(1, 8, 1), 0.1, kFrame, "1 x 8");
     refused(Image(8, 8, 1), 0, kFrame, "must be finite and > 0");
+    refused(Image(8, 8, 1), 1e-13, kFrame, "too many for an object of 2 m; give the tile's side");
     refused(tile(4, [](int, int) { return NAN; }), 1, kFrame, "not finite");
     refused(Image(8, 8, 1), 1, Box{{1, 1, 1}, {1, 1, 1}}, "no extent");
 }

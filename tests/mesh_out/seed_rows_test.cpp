@@ -7,10 +7,10 @@
 
 #include "mesh_out/certificate.h"
 #include "mesh_out/extract.h"
-#include "mesh_out/relief_around.h"
 #include "mesh_out/render.h"
 #include "vdb_ops/recipe_solid.h"
 #include "vdb_ops/relief.h"
+#include "vdb_ops/relief_around.h"
 #include "vdb_ops/shapes.h"
 
 namespace taihu {

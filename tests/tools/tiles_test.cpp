@@ -26,7 +26,12 @@ std::string tiles_hash(const std::filesystem::path& folder) {
 
 TEST(TileCommands, ARecipeInTilesIsTheWhole) {
     const Scratch folder;
-    const std::string rock = "taihu rock --preset sponge --dim 150 --height 1.8m --seed 7 ";
+    write_file(folder / "sponge.json",
+               R"({"taihu_recipe": 1, "solid": {"clean": {"of": {"difference": {"of": [
+               {"boulder": {"size_m": [1, 0.62, 0.75], "subdivisions": 6, "relief": 0.18,
+               "lumps": 1.2}}, {"holes": {"law": {"family": "lognormal", "parameters":
+               {"mean_log": -3, "sd_log": 0.45}}, "porosity": 0.62}}]}}}}})");
+    const std::string rock = "taihu rock sponge.json --dim 150 --height 1.8m --seed 7 ";
     must(rock + "-o whole.vdb -q", folder);
     const json made = result(rock + "--tiles 128 -o tiles", folder);
     EXPECT_GT(made["tiles"], 1);

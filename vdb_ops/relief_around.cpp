@@ -1,4 +1,4 @@
-#include "mesh_out/relief_around.h"
+#include "vdb_ops/relief_around.h"
 
 #include <algorithm>
 #include <array>
@@ -9,11 +9,13 @@
 #include <tbb/parallel_for.h>
 
 #include "stats/core/error.h"
+#include "stats/number_detail.h"
 
 namespace taihu {
 namespace {
 
 constexpr double kPi = std::numbers::pi;
+constexpr double kLeastPixel = 1e-12;   ///< between points / size of the object: they are counted
 constexpr double kNearestToAxis = 1e-3; ///< of the radius: nearer than this, longitudes are held
 
 [[noreturn]] void refuse(const std::string& what) {
@@ -64,9 +66,10 @@ std::vector<Vec3> mean_normals(const TriMesh& mesh) {
 } // namespace
 
 ReliefAround::ReliefAround(Image heights, double pixel_m, bool tileable, ReliefMap map,
-                           const Box& frame)
+                           const Box& frame, double sharpness)
     : heights_(std::move(heights)), pixel_m_(pixel_m), tileable_(tileable), map_(map),
-      middle_(frame.lo * 0.5 + frame.hi * 0.5), stretch_u_(1), stretch_v_(1) {
+      middle_(frame.lo * 0.5 + frame.hi * 0.5), stretch_u_(1), stretch_v_(1),
+      sharpness_(sharpness) {
     if (heights_.channels != 1 || heights_.width < 2 || heights_.height < 2)
         refuse("a tile of " + std::to_string(heights_.width) + " x " +
                std::to_string(heights_.height) + " points and " +
@@ -76,6 +79,11 @@ ReliefAround::ReliefAround(Image heights, double pixel_m, bool tileable, ReliefM
     if (!std::all_of(heights_.pixels.begin(), heights_.pixels.end(),
                      [](float h) { return std::isfinite(h); }))
         refuse("a height that is not finite; make the tile again");
+    if (pixel_m < kLeastPixel * frame.longest())
+        refuse("points every " + shortest(pixel_m) + " m are too many for an object of " +
+               shortest(frame.longest()) + " m; give the tile's side");
+    if (!(sharpness >= 1 && sharpness <= 64))
+        refuse("sharpness is " + std::to_string(sharpness) + ", must be 1..64");
     const Vec3 size = frame.size();
     if (!(frame.longest() > 0) || !is_finite(size))
         refuse("the object has no extent; give one that has");
@@ -105,8 +113,8 @@ std::vector<ReliefAround::Place> ReliefAround::places(const Vec3& p, const Vec3&
         std::array<double, 3> weight{};
         double sum = 0;
         for (std::size_t axis = 0; axis < 3; ++axis) {
-            const double n2 = normal[static_cast<int>(axis)] * normal[static_cast<int>(axis)];
-            sum += weight[axis] = n2 * n2;
+            weight[axis] = std::pow(std::fabs(normal[static_cast<int>(axis)]), sharpness_);
+            sum += weight[axis];
         }
         for (int axis = 0; axis < 3; ++axis)
             if (const double w = weight[static_cast<std::size_t>(axis)] / sum; w > 0)
@@ -179,6 +187,30 @@ TriMesh ReliefAround::displaced(const TriMesh& mesh) const {
         out.positions[v] = p + n * height_m(p, n);
         out.normals[v] = bumped(p, n);
     });
+    return out;
+}
+
+Image without_short_waves(const Image& heights, double pixel_m, bool tileable, double least_m) {
+    Image out = heights;
+    const long width = heights.width, height = heights.height;
+    const auto smoothed = [&](long reach, bool along_rows) {
+        const Image before = out;
+        tbb::parallel_for(0L, height, [&](long y) {
+            for (long x = 0; x < width; ++x) {
+                const auto at = [&](long by) {
+                    const long column = along_rows ? wrapped(x + by, width, tileable) : x,
+                               row = along_rows ? y : wrapped(y + by, height, tileable);
+                    return *before.at(static_cast<int>(column), static_cast<int>(row));
+                };
+                *out.at(static_cast<int>(x), static_cast<int>(y)) =
+                    0.5f * at(0) + 0.25f * (at(-reach) + at(reach));
+            }
+        });
+    };
+    for (long reach = 1; 4 * pixel_m * double(reach) <= least_m && reach < width; reach *= 2) {
+        smoothed(reach, true);
+        smoothed(reach, false);
+    }
     return out;
 }
 

@@ -24,9 +24,12 @@ class ReliefAround {
 public:
     /// \param heights  1 channel [m], 2 x 2 or more, finite; the first row is the top.
     /// \param pixel_m  between points, > 0. \param frame  what it is laid around: bounds of a mesh.
+    /// \param sharpness  of triplanar: layers weigh as this power of how much the surface faces
+    /// them, 1..64.
     /// \throws Error bad_argument: another number of channels, too small, not finite; a frame
-    /// without extent.
-    ReliefAround(Image heights, double pixel_m, bool tileable, ReliefMap map, const Box& frame);
+    /// without extent or of more than 1e12 pixels; a sharpness out of range.
+    ReliefAround(Image heights, double pixel_m, bool tileable, ReliefMap map, const Box& frame,
+                 double sharpness = 4);
 
     /// Where a point of the surface lies in one of the (at most three) layers that cover it.
     struct Place {
@@ -62,6 +65,11 @@ private:
     Vec3 middle_;
     double radius_m_;              ///< of the sphere or the cylinder
     double stretch_u_, stretch_v_; ///< tile metres per metre
+    double sharpness_;
 };
+
+/// Heights without waves shorter than `least_m`, on the same points: for surfaces that cannot show
+/// them. Tents of twice the width each time, until the next would be wider than half of that.
+Image without_short_waves(const Image& heights, double pixel_m, bool tileable, double least_m);
 
 } // namespace taihu
