@@ -38,8 +38,8 @@ constexpr double kGrown = 0.25;           ///< of a bound, for walls that coarse
 constexpr double kShut = 0.5;            ///< of a bound: what lies deeper in a grown solid was shut
 constexpr double kAlike = 0.5;           ///< cosine of the angle between normals of the same place
 constexpr double kFewBeyondGrown = 1e-3; ///< as kFewBeyond, of levels on coarser voxels
-constexpr double kShrink = 0.68, kLeastShrink = 1. / 3; ///< of levels, as Chain::shrink_
-constexpr int kCoarsest = 8;                            ///< voxels along one of a level's own
+constexpr double kShrink = 0.68, kLeastShrink = 0.5; ///< of levels, as Chain::shrink_
+constexpr int kCoarsest = 8;                         ///< voxels along one of a level's own
 constexpr double kLeastMove = 1.0 / 16; ///< of what rounding may take, where faces would cross
 constexpr double kLost = 0.5;           ///< of the finest bound: not worth a look
 constexpr double kNearly = 0.75;        ///< of a bound, at one point: beyond it beside
@@ -243,7 +243,9 @@ std::vector<Vec3> Chain::normals(const LabelledMesh& mesh) const {
 TriMesh Chain::snapped(const BoundedMesh& mesh, double bound_m, double most_m,
                        PositionGrid& grid) const {
     const TriMesh plain{mesh.mesh.positions, mesh.mesh.triangles, normals(mesh.mesh)};
-    const Box box = box_.dilated(std::min(bound_m, box_.longest())); // balanced vertices lie off
+    Box box = box_.dilated(std::min(bound_m, box_.longest())); // balanced vertices lie off
+    for (const Vec3& p : plain.positions)
+        box.include(p); // of parts that are named, farther
     const double least_m =
         std::max(kLeastMove * most_m, 1.001 * finest_grid(box).step_m * std::sqrt(3.0) / 2);
     for (double move_m = most_m;; move_m /= 4) {

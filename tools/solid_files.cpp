@@ -112,7 +112,7 @@ RecipeAssets recipe_assets(std::vector<std::filesystem::path> folders, const Con
                 return read_mesh(file, {unit_m, z_up ? UpAxis::z : UpAxis::y}, console.progress)
                     .levels.front();
             },
-            read_relief};
+            [](const std::filesystem::path& path) { return read_relief(path); }};
 }
 
 Solid read_solid(const SolidOptions& options, const Console& console, Surfaces surfaces) {

@@ -108,7 +108,7 @@ TEST(Rock, EachPresetIsACertifiedRock) {
     const json list = json::parse(run("taihu rock --list --json", folder.path()).out);
     EXPECT_GE(list.size(), 12u);
     for (const auto& [name, about] : list.items()) {
-        must("taihu rock --preset " + name + " --dim 32 -o rock.ply -q", folder);
+        must("taihu rock --preset " + name + " --dim 40 -o rock.ply -q", folder);
         must("taihu check rock.ply -q", folder);
     }
 }

@@ -24,13 +24,17 @@ std::string tiles_hash(const std::filesystem::path& folder) {
     return grid_hash(*read_tiles(folder / kTileSetName));
 }
 
-TEST(TileCommands, ARecipeInTilesIsTheWhole) {
-    const Scratch folder;
+void write_sponge(const Scratch& folder) {
     write_file(folder / "sponge.json",
                R"({"taihu_recipe": 1, "solid": {"clean": {"of": {"difference": {"of": [
                {"boulder": {"size_m": [1, 0.62, 0.75], "subdivisions": 6, "relief": 0.18,
                "lumps": 1.2}}, {"holes": {"law": {"family": "lognormal", "parameters":
                {"mean_log": -3, "sd_log": 0.45}}, "porosity": 0.62}}]}}}}})");
+}
+
+TEST(TileCommands, ARecipeInTilesIsTheWhole) {
+    const Scratch folder;
+    write_sponge(folder);
     const std::string rock = "taihu rock sponge.json --dim 150 --height 1.8m --seed 7 ";
     must(rock + "-o whole.vdb -q", folder);
     const json made = result(rock + "--tiles 128 -o tiles", folder);
@@ -51,7 +55,8 @@ TEST(TileCommands, ARecipeInTilesIsTheWhole) {
 
 TEST(TileCommands, AMeshOfTilesIsOneClosedSurface) {
     const Scratch folder;
-    must("taihu rock --preset sponge --dim 150 --seed 7 --tiles 128 -o tiles", folder);
+    write_sponge(folder);
+    must("taihu rock sponge.json --dim 150 --height 1.8m --seed 7 --tiles 128 -o tiles", folder);
     const json made = result("taihu mesh tiles/tiles.json -o rock.ply", folder)["certificate"];
     EXPECT_TRUE(made["holds"]);
     EXPECT_EQ(made["self_intersections"], 0);
