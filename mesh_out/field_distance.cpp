@@ -22,6 +22,7 @@ constexpr double kFarthest = 8;     ///< spacings that a projection may take
 constexpr std::size_t kChunk = 512; ///< faces or points that are summed together
 constexpr double kClose = 0.7;      ///< of the limit: looked at more closely
 constexpr int kParts = 3;           ///< of an edge then
+constexpr double kSure = 0.98;      ///< of the limit: points between samples may be farther
 constexpr int kFinest = 64;         ///< parts of an edge
 
 /// The nearest point of the surface that can be reached by projecting onto the primitive that
@@ -166,7 +167,7 @@ FieldDistance field_distance(const TriMesh& mesh, const FieldProbe& field, const
     Sum back = summed(surface.positions.size(), progress, [&](std::size_t i, Sum& sum) {
         const double d = to_mesh(surface.positions[i]);
         is_close[i] = d > kClose * limit_m;
-        sum.add(surface.positions[i], d, limit_m, apart);
+        sum.add(surface.positions[i], d, kSure * limit_m, apart);
     });
     back.add(summed(surface.triangles.size(), progress, [&](std::size_t f, Sum& sum) {
         const Triangle& t = surface.triangles[f];
@@ -182,7 +183,7 @@ FieldDistance field_distance(const TriMesh& mesh, const FieldProbe& field, const
                 if (!(to_mesh(p) > kClose * limit_m))
                     continue;
                 if (const auto y = surface_point(field, p, spacing_m))
-                    sum.add(*y, to_mesh(*y), limit_m, apart);
+                    sum.add(*y, to_mesh(*y), kSure * limit_m, apart);
             }
     }));
     FieldDistance result;

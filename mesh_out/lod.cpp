@@ -41,7 +41,7 @@ constexpr double kFewBeyondGrown = 1e-3; ///< as kFewBeyond, of levels on coarse
 constexpr double kShrink = 0.68, kLeastShrink = 0.5; ///< of levels, as Chain::shrink_
 constexpr int kCoarsest = 8;                         ///< voxels along one of a level's own
 constexpr double kLeastMove = 1.0 / 16; ///< of what rounding may take, where faces would cross
-constexpr double kLost = 0.5;           ///< of the finest bound: not worth a look
+constexpr double kLost = 0.25;          ///< of the finest bound: not worth a look
 constexpr double kNearly = 0.75;        ///< of a bound, at one point: beyond it beside
 constexpr double kSpeck = 2, kLargestSpeck = 16; ///< bounds: pieces that long are dropped
 constexpr int kAttempts = 2, kMostLevels = 8, kMostBits = 18;
