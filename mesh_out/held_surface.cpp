@@ -39,7 +39,7 @@ HeldSurface held_surface(const TriMesh& surface, const TriMesh& coarse, const Fi
             out.mesh.triangles.push_back({renamed[t[0]], renamed[t[1]], renamed[t[2]]});
         else
             dropped.push_back(t);
-    std::vector<std::vector<Vec3>> ways(dropped.size());
+    std::vector<std::vector<Vec3>> ways(dropped.size()), open(dropped.size());
     tbb::parallel_for(std::size_t{0}, dropped.size(), [&](std::size_t f) {
         const Triangle& t = dropped[f];
         const Vec3 a = points[t[0]], b = points[t[1]], c = points[t[2]];
@@ -48,12 +48,14 @@ HeldSurface held_surface(const TriMesh& surface, const TriMesh& coarse, const Fi
         for (int u = 0; u <= n; ++u)
             for (int v = 0; u + v <= n; ++v) {
                 const Vec3 p = a + (b - a) * (double(u) / n) + (c - a) * (double(v) / n);
-                if (!is_filled(p) && is_shut(p))
-                    ways[f].push_back(p);
+                if (!is_filled(p))
+                    (is_shut(p) ? ways : open)[f].push_back(p);
             }
     });
-    for (const auto& part : ways)
-        out.shut.insert(out.shut.end(), part.begin(), part.end());
+    for (std::size_t f = 0; f < dropped.size(); ++f) {
+        out.shut.insert(out.shut.end(), ways[f].begin(), ways[f].end());
+        out.mesh.positions.insert(out.mesh.positions.end(), open[f].begin(), open[f].end());
+    }
     return out;
 }
 

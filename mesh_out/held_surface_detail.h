@@ -10,7 +10,7 @@ namespace taihu {
 
 /// What a level on coarser voxels is held to of the surface that it stands for.
 struct HeldSurface {
-    TriMesh mesh;           ///< the faces that the coarser solid left open
+    TriMesh mesh; ///< the faces that the coarser solid left open, and points of those partly open
     std::vector<Vec3> shut; ///< points of the others, on ways into holes that are not in `closed`
 };
 

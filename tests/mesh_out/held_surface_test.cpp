@@ -1,5 +1,6 @@
 #include "mesh_out/held_surface_detail.h"
 
+#include <algorithm>
 #include <cmath>
 #include <memory>
 
@@ -35,6 +36,12 @@ TEST(HeldSurface, NamesAllOfAHoleThatWasShut) {
     const HeldSurface held = held_surface(rock.fine, rock.coarse, *rock.grown, {}, 1, 1);
     for (const Vec3& p : held.mesh.positions)
         EXPECT_LT(20 - length(p), 1.5); // deeper than 1, by what the coarse faces are off
+    std::vector<bool> is_corner(held.mesh.positions.size());
+    for (const Triangle& t : held.mesh.triangles)
+        for (const std::uint32_t v : t)
+            is_corner[v] = true;
+    // Faces that reach into the hole are held to where they are outside.
+    EXPECT_GT(std::count(is_corner.begin(), is_corner.end(), false), 0);
     for (const Vec3& p : held.shut)
         EXPECT_NEAR(length(p - rock.hole.center), 3, 0.5); // within half a bound of its wall
     // Whatever lies between the corners of large faces is named, too: every point of the deep wall
