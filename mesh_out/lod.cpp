@@ -125,6 +125,7 @@ private:
         return field.probe(box_.dilated(reach_m), reach_m);
     }
     const TriMesh& held() const { return model_.held.triangles.empty() ? reference_ : model_.held; }
+    void drop_unseen(const SurfaceDistance& to_reference);
     void drop_shut(double bound_m, const LabelledMesh& surface);
 
     const openvdb::FloatGrid& solid_;
@@ -134,7 +135,8 @@ private:
     std::unique_ptr<const Field> own_; ///< where none was given
     const Field* field_;
     TriMesh reference_;
-    std::vector<Vec3> lost_; ///< on the field's surface, where the level set may not see it
+    std::vector<Vec3> lost_;     ///< on the field's surface, where the level set may not see it
+    std::vector<Sphere> unseen_; ///< round those that are far from all it sees
     Box box_;
     double origin_step_m_ = 0;
     LabelledMesh last_; ///< as the last level of the field left it, on the surface
@@ -169,9 +171,22 @@ Chain::Chain(const openvdb::FloatGrid& solid, const Field* field, const LodSetti
         own_ = std::make_unique<PlacedLevelSetField>(solid.copy()); // its band may be widened
         field_ = own_.get();
     } else {
-        lost_ = lost_surface(solid, *probe(*field, 2 * voxel_m_), SurfaceDistance(reference_),
+        const SurfaceDistance to_reference(reference_);
+        lost_ = lost_surface(solid, *probe(*field, 2 * voxel_m_), to_reference,
                              kLost * finest_bound_m(), progress);
+        drop_unseen(to_reference);
     }
+}
+
+void Chain::drop_unseen(const SurfaceDistance& to_reference) {
+    const double radius_m = 2 * voxel_m_;
+    std::erase_if(lost_, [&](const Vec3& p) {
+        const auto holds = [&](const Sphere& s) { return length(p - s.center) <= s.radius_m; };
+        const bool is_far = to_reference(p) > radius_m;
+        if (is_far && std::none_of(unseen_.begin(), unseen_.end(), holds))
+            unseen_.push_back({p, radius_m});
+        return is_far;
+    });
 }
 
 void Chain::use_field(double bound_m) {
@@ -437,6 +452,7 @@ bool Chain::of_triangles(std::size_t n, LodLevel& level, std::string& why) {
 LodChain Chain::make() {
     LodChain chain;
     chain.n_reference_triangles = reference_.triangles.size();
+    chain.unseen = unseen_;
     const std::size_t n = settings_.levels.size();
     for (std::size_t j = 0; j < n; ++j) {
         report_stage(progress_, "level " + std::to_string(j + 1) + " of " + std::to_string(n));

@@ -50,6 +50,9 @@ struct LodLevel {
 struct LodChain {
     std::vector<LodLevel> levels;          ///< finest first, triangle counts strictly decreasing
     std::size_t n_reference_triangles = 0; ///< of the sharp surface that all levels are made of
+    /// About parts of the field's surface that no level has, since no voxel sees them, more than
+    /// two voxels from all that is seen: bubbles and specks narrower than a voxel.
+    std::vector<Sphere> unseen;
     std::string note;                      ///< why there are fewer levels than asked for, or empty
 };
 

@@ -50,6 +50,13 @@ nlohmann::ordered_json vector_json(const Vec3& v) {
     return {v.x, v.y, v.z};
 }
 
+nlohmann::ordered_json unseen_json(const std::vector<Sphere>& unseen) {
+    nlohmann::ordered_json json = {{"n", unseen.size()}, {"some", nlohmann::json::array()}};
+    for (std::size_t i = 0; i < std::min(kMostListed, unseen.size()); ++i)
+        json["some"].push_back(vector_json(unseen[i].center));
+    return json;
+}
+
 nlohmann::ordered_json unresolved_json(std::vector<UnresolvedPlace> places) {
     std::stable_sort(places.begin(), places.end(),
                      [](const auto& a, const auto& b) { return a.radius_m > b.radius_m; });
@@ -87,6 +94,7 @@ std::string format_report(const LodChain& chain, const std::string& file) {
         "within the bound of a hole that was closed";
     report["n_reference_triangles"] = chain.n_reference_triangles;
     report["note"] = chain.note;
+    report["unseen"] = unseen_json(chain.unseen);
     report["levels"] = nlohmann::ordered_json::array();
     for (std::size_t j = 0; j < chain.levels.size(); ++j) {
         const LodLevel& level = chain.levels[j];

@@ -60,9 +60,10 @@ private:
 /// Looks for the field's surface near points, and keeps what was not extracted.
 class Seeker {
 public:
-    Seeker(const FieldProbe& field, const SurfaceDistance& extracted, double voxel_m,
-           double least_m)
-        : field_(field), extracted_(extracted), voxel_m_(voxel_m), least_m_(least_m) {}
+    Seeker(const openvdb::FloatGrid& solid, const FieldProbe& field,
+           const SurfaceDistance& extracted, double least_m)
+        : solid_(solid.tree()), lattice_(lattice_of(solid)), field_(field), extracted_(extracted),
+          voxel_m_(lattice_.voxel_m), least_m_(least_m) {}
 
     /// On every primitive near `p`, or where those meet that cut off its nearest point.
     void seek(const Vec3& p) {
@@ -71,12 +72,28 @@ public:
         near_.clear();
         field_.near(p, kFarthest_vox * voxel_m_, near_);
         for (const Primitive one : near_)
-            if (const auto y = surface_point(one, p); y && extracted_(*y) > least_m_)
+            if (const auto y = surface_point(one, p);
+                y && extracted_(*y) > least_m_ && !was_cleaned(*y))
                 found.push_back(*y);
     }
     std::vector<Vec3> found;
 
 private:
+    /// Whether voxels near `p` have another sign than the field: bubbles that were filled, pieces
+    /// that were removed.
+    bool was_cleaned(const Vec3& p) const {
+        const Vec3 at = (p - lattice_.origin) / voxel_m_;
+        const Coord first(static_cast<int>(std::floor(at.x)), static_cast<int>(std::floor(at.y)),
+                          static_cast<int>(std::floor(at.z)));
+        for (int k = 0; k < 64; ++k) {
+            const Coord c = first.offsetBy(k / 16 - 1, k / 4 % 4 - 1, k % 4 - 1);
+            const Vec3 corner =
+                lattice_.origin + Vec3{double(c.x()), double(c.y()), double(c.z())} * voxel_m_;
+            if ((solid_.getValue(c) < 0) != (field_.at(corner).value_m < 0))
+                return true;
+        }
+        return false;
+    }
     std::optional<Vec3> surface_point(Primitive one, const Vec3& p) const {
         PrimitiveSet set(one);
         for (std::size_t i = 0; i < PrimitiveSet::kMost; ++i) {
@@ -92,6 +109,8 @@ private:
         return std::nullopt;
     }
 
+    openvdb::tree::ValueAccessor<const openvdb::FloatTree, false> solid_;
+    Lattice lattice_;
     const FieldProbe& field_;
     const SurfaceDistance& extracted_;
     double voxel_m_, least_m_;
@@ -111,7 +130,7 @@ std::vector<Vec3> lost_surface(const openvdb::FloatGrid& solid, const FieldProbe
         check_cancelled(progress);
         const Coord origin = leaves[n]->origin();
         const Halo halo(solid, origin, static_cast<float>(1 / lattice.voxel_m));
-        Seeker seeker(field, extracted, lattice.voxel_m, least_m);
+        Seeker seeker(solid, field, extracted, least_m);
         for (int x = 0; x < kDim; ++x)
             for (int y = 0; y < kDim; ++y)
                 for (int z = 0; z < kDim; ++z) {

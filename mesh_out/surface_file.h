@@ -29,6 +29,7 @@ struct SurfaceFile {
     double error_m = 0;            ///< to the surface, both ways, by closest point
     std::size_t n_unresolved = 0;  ///< places where the bound is not promised
     double unresolved_error_m = 0; ///< there
+    std::size_t n_unseen = 0;      ///< LodChain::unseen
 };
 
 /// The surface of a solid in any mesh format, certified from the bytes themselves.

@@ -78,6 +78,7 @@ void tell(const LodChain& chain, const std::string& where, const Console& consol
                         chain.levels[0].certificate.n_components, c.n_components);
         say_unresolved(where, level.unresolved.size(), level.unresolved_error_m, console);
     }
+    say_unseen(where, chain.unseen.size(), console);
     if (!chain.note.empty())
         console.say("{}: {}", where, chain.note);
 }

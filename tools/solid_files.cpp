@@ -305,6 +305,12 @@ void say_unresolved(const std::string& where, std::size_t n, double error_m,
                     where, n, n == 1 ? "" : "s", error_m);
 }
 
+void say_unseen(const std::string& where, std::size_t n, const Console& console) {
+    if (n > 0)
+        console.say("{}: without {} bubble{} or speck{} narrower than a voxel", where, n,
+                    n == 1 ? "" : "s", n == 1 ? "" : "s");
+}
+
 nlohmann::ordered_json write_solid(const std::filesystem::path& path,
                                    const openvdb::FloatGrid& grid, const Field* field,
                                    const std::string& recipe, const SurfaceSettings& surface,
@@ -326,12 +332,14 @@ nlohmann::ordered_json write_solid(const std::filesystem::path& path,
         json["bound_m"] = file.bound_m;
         json["error_m"] = file.error_m;
         json["unresolved"] = file.n_unresolved;
+        json["unseen"] = file.n_unseen;
         json["certificate"] = certificate_json(file.certificate);
         console.say("{}: {}", path.string(), certificate_line(file.certificate));
         console.say("{}: within {:.3g} m of the {} (bound {:.3g} m), {} bytes", path.string(),
                     file.error_m, surface.uniform ? "uniform surface" : "solid's surface",
                     file.bound_m, file.bytes.size());
         say_unresolved(path.string(), file.n_unresolved, file.unresolved_error_m, console);
+        say_unseen(path.string(), file.n_unseen, console);
     }
     return json;
 }

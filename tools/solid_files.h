@@ -92,6 +92,9 @@ nlohmann::ordered_json write_solid(const std::filesystem::path& path,
 void say_unresolved(const std::string& where, std::size_t n, double error_m,
                     const Console& console);
 
+/// The line for bubbles and specks that no voxel sees.
+void say_unseen(const std::string& where, std::size_t n, const Console& console);
+
 nlohmann::ordered_json certificate_json(const Certificate& certificate);
 /// `closed 2-manifold, outward: 1 piece, genus 12, 0.41 m^3, 0 self-intersections`.
 std::string certificate_line(const Certificate& certificate);

@@ -345,6 +345,19 @@ void expect_refused(const LodSettings& settings, Fault fault, const char* text) 
     }
 }
 
+TEST(Lod, SaysWhichBubblesNoVoxelSees) {
+    const Vec3 unseen{2.5 * kVoxel, 0.5 * kVoxel, 0.5 * kVoxel}; // between lattice points
+    const DifferenceField field(
+        std::make_shared<BallsField>(std::vector<Sphere>{{{0, 0, 0}, 1}}),
+        std::make_shared<BallsField>(std::vector<Sphere>{{unseen, 0.6 * kVoxel}}));
+    const LodChain chain =
+        make_lods(*rasterize(field, Lattice{kVoxel, {}, 3}), &field, {.levels = {{kVoxel / 4}}});
+    ASSERT_EQ(chain.unseen.size(), 1u);
+    EXPECT_NEAR(length(chain.unseen[0].center - unseen), 0.6 * kVoxel, 1e-3 * kVoxel);
+    EXPECT_TRUE(chain.levels[0].unresolved.empty());
+    EXPECT_EQ(nlohmann::json::parse(format_report(chain, "a.glb")).at("unseen").at("n"), 1);
+}
+
 TEST(Lod, NamesTheSettingOutOfRange) {
     expect_refused({}, Fault::bad_argument, "0 levels, must be 1..8");
     expect_refused({.levels = bounds_by_factor(9, 1, 2)}, Fault::bad_argument, "9 levels");

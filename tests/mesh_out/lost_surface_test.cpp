@@ -7,6 +7,7 @@
 
 #include "mesh_out/extract.h"
 #include "vdb_ops/balls_field.h"
+#include "vdb_ops/clean.h"
 #include "vdb_ops/combine_field.h"
 #include "vdb_ops/csg_field.h"
 #include "vdb_ops/rasterize.h"
@@ -20,11 +21,14 @@ std::shared_ptr<const Field> balls(Balls of) {
     return std::make_shared<BallsField>(std::move(of));
 }
 
-std::vector<Vec3> lost(const Field& field) {
-    const auto grid = rasterize(field, Lattice{1, {}, 3});
+std::vector<Vec3> lost(const openvdb::FloatGrid& solid, const Field& field) {
     const auto probe = field.probe({{-60, -60, -60}, {60, 60, 60}}, 2);
-    const LabelledMesh seen = extract(*grid, &field, {.bound_vox = 0.25});
-    return lost_surface(*grid, *probe, SurfaceDistance({seen.positions, seen.triangles, {}}), 0.2);
+    const LabelledMesh seen = extract(solid, &field, {.bound_vox = 0.25});
+    return lost_surface(solid, *probe, SurfaceDistance({seen.positions, seen.triangles, {}}), 0.2);
+}
+
+std::vector<Vec3> lost(const Field& field) {
+    return lost(*rasterize(field, Lattice{1, {}, 3}), field);
 }
 
 TEST(LostSurface, NothingIsLostWhereVoxelsSeeAll) {
@@ -75,6 +79,19 @@ TEST(LostSurface, FindsABallBetweenVoxels) {
     ASSERT_FALSE(points.empty());
     for (const Vec3& p : points)
         EXPECT_NEAR(length(p - Vec3{20.5, 0.5, 0.5}), 0.6, 1e-4);
+}
+
+TEST(LostSurface, WhatWasFilledOrRemovedIsNotLost) {
+    // Bubbles and specks that one to eight lattice points see.
+    const DifferenceField field(
+        balls({{{0.3, 0.2, 0.1}, 20}, {{30, 0, 0}, 1.2}, {{-31.5, 0.4, 0.4}, 1.1}}),
+        balls({{{1, 2, 3}, 0.9}, {{-8.5, 0.5, 0.5}, 1.2}, {{0.5, 11, -4}, 1.4}}));
+    const auto solid = rasterize(field, Lattice{1, {}, 3});
+    EXPECT_FALSE(lost(field).empty());
+    const CleanResult cleaned = clean(*solid);
+    ASSERT_EQ(cleaned.n_bubbles_filled, 3u);
+    ASSERT_EQ(cleaned.n_pieces_removed, 2u);
+    EXPECT_TRUE(lost(*cleaned.solid, field).empty());
 }
 
 } // namespace

@@ -96,13 +96,15 @@ std::string shown(const OffBound& off) {
     return text;
 }
 
-void judge_bound(const LodLevel& level, const TriMesh& mesh, const BoundCheck& check,
-                 const std::string& where, Recorder& out) {
+void judge_bound(const LodLevel& level, const std::vector<Sphere>& unseen, const TriMesh& mesh,
+                 const BoundCheck& check, const std::string& where, Recorder& out) {
     std::vector<Sphere> named;
     for (const UnresolvedPlace& place : level.unresolved)
         named.push_back({place.center, place.radius_m + level.bound_m});
     for (const Sphere& closed : level.closed)
         named.push_back({closed.center, closed.radius_m + level.bound_m});
+    for (const Sphere& place : unseen)
+        named.push_back({place.center, place.radius_m + level.bound_m});
     const BoundVerdict verdict = check.judge(mesh, level.bound_m, named);
     out.add("samples", verdict.n_samples);
     out.add("samples named", verdict.n_named);
@@ -156,7 +158,7 @@ Counts run_recipe(std::uint64_t seed) {
             const TriMesh mesh = decode_draco(level.encoded.draco, where);
             const std::string which = "level " + std::to_string(j);
             judge_topology(level, mesh, which, out);
-            judge_bound(level, mesh, check, which, out);
+            judge_bound(level, chain.unseen, mesh, check, which, out);
             out.add("levels", 1);
             out.add("triangles", mesh.triangles.size());
         }
