@@ -22,6 +22,8 @@ constexpr double kFarthest = 8;     ///< spacings that a projection may take
 constexpr std::size_t kChunk = 512; ///< faces or points that are summed together
 constexpr double kClose = 0.7;      ///< of the limit: looked at more closely
 constexpr int kParts = 3;           ///< of an edge then
+constexpr double kVeryClose = 0.9;  ///< looked at once more, every
+constexpr double kFine = 0.15;      ///< of the spacing
 constexpr double kSure = 0.98;      ///< of the limit: points between samples may be farther
 constexpr int kFinest = 64;         ///< parts of an edge
 
@@ -175,16 +177,27 @@ FieldDistance field_distance(const TriMesh& mesh, const FieldProbe& field, const
             return;
         const Vec3 a = surface.positions[t[0]], b = surface.positions[t[1]],
                    c = surface.positions[t[2]];
-        for (int u = 0; u <= kParts; ++u)
-            for (int v = 0; u + v <= kParts; ++v) {
-                if (u == kParts || v == kParts || u + v == 0)
-                    continue; // a corner
-                const Vec3 p = a + (b - a) * (double(u) / kParts) + (c - a) * (double(v) / kParts);
-                if (!(to_mesh(p) > kClose * limit_m))
-                    continue;
-                if (const auto y = surface_point(field, p, spacing_m))
-                    sum.add(*y, to_mesh(*y), kSure * limit_m, apart);
-            }
+        const double long_m = std::max({length(b - a), length(c - b), length(a - c)});
+        const auto look = [&](int n) {
+            double most_m = 0;
+            for (int u = 0; u <= n; ++u)
+                for (int v = 0; u + v <= n; ++v) {
+                    if (u == n || v == n || u + v == 0)
+                        continue; // a corner
+                    const Vec3 p = a + (b - a) * (double(u) / n) + (c - a) * (double(v) / n);
+                    if (!(to_mesh(p) > kClose * limit_m))
+                        continue;
+                    if (const auto y = surface_point(field, p, spacing_m)) {
+                        const double d = to_mesh(*y);
+                        sum.add(*y, d, kSure * limit_m, apart);
+                        most_m = std::max(most_m, d);
+                    }
+                }
+            return most_m;
+        };
+        const double most_m = look(kParts);
+        if (most_m > kVeryClose * limit_m && most_m <= kSure * limit_m)
+            look(std::max(3 * kParts, n_parts(long_m, kFine * spacing_m)));
     }));
     FieldDistance result;
     result.max_to_field_m = there.most;

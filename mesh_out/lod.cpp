@@ -10,6 +10,7 @@
 
 #include <tbb/parallel_for.h>
 
+#include "mesh_out/covering_balls_detail.h"
 #include "mesh_out/crossings_detail.h"
 #include "mesh_out/extract.h"
 #include "mesh_out/field_distance.h"
@@ -44,7 +45,7 @@ constexpr double kLeastMove = 1.0 / 16; ///< of what rounding may take, where fa
 constexpr double kLost = 0.25;          ///< of the finest bound: not worth a look
 constexpr double kNearly = 0.75;        ///< of a bound, at one point: beyond it beside
 constexpr double kSpeck = 2, kLargestSpeck = 16; ///< bounds: pieces that long are dropped
-constexpr int kAttempts = 2, kMostLevels = 8, kMostBits = 18;
+constexpr int kAttempts = 2, kAttemptsCrossing = 4, kMostLevels = 8, kMostBits = 18;
 
 std::string shown(double value) {
     return rounded(value, 6);
@@ -106,7 +107,6 @@ private:
                     PositionGrid& grid) const;
     void name_lost(LodLevel& level, const std::vector<Vec3>& dropped) const;
     Written written(const BoundedMesh& mesh, double bound_m, double move_m, double speck) const;
-    std::vector<Sphere> around(const std::vector<Vec3>& points, double radius_m) const;
     bool simplified(double bound_m, LabelledMesh& surface, LodLevel& level) const;
     bool within(double bound_m, const LodLevel* before, LodLevel& level);
     bool of_triangles(std::size_t n, LodLevel& level, std::string& why);
@@ -179,14 +179,11 @@ Chain::Chain(const openvdb::FloatGrid& solid, const Field* field, const LodSetti
 }
 
 void Chain::drop_unseen(const SurfaceDistance& to_reference) {
-    const double radius_m = 2 * voxel_m_;
-    std::erase_if(lost_, [&](const Vec3& p) {
-        const auto holds = [&](const Sphere& s) { return length(p - s.center) <= s.radius_m; };
-        const bool is_far = to_reference(p) > radius_m;
-        if (is_far && std::none_of(unseen_.begin(), unseen_.end(), holds))
-            unseen_.push_back({p, radius_m});
-        return is_far;
-    });
+    const double far_m = 2 * voxel_m_;
+    const auto far = std::stable_partition(
+        lost_.begin(), lost_.end(), [&](const Vec3& p) { return !(to_reference(p) > far_m); });
+    unseen_ = balls_apart({far, lost_.end()}, far_m);
+    lost_.erase(far, lost_.end());
 }
 
 void Chain::use_field(double bound_m) {
@@ -231,7 +228,7 @@ void Chain::drop_shut(double bound_m, const LabelledMesh& surface) {
         held_surface(reference_, {surface.positions, surface.triangles, {}}, *model_.probe,
                      model_.closed, model_.off_m + kShut * bound_m, bound_m);
     model_.held = std::move(held.mesh);
-    const std::vector<Sphere> ways = around(held.shut, bound_m);
+    const std::vector<Sphere> ways = balls_over_cubes(held.shut, bound_m);
     model_.closed.insert(model_.closed.end(), ways.begin(), ways.end());
 }
 
@@ -296,7 +293,7 @@ void Chain::name_lost(LodLevel& level, const std::vector<Vec3>& dropped) const {
             beyond.push_back(p);
             level.unresolved_error_m = std::max(level.unresolved_error_m, off_m);
         }
-    for (const Sphere& ball : around(beyond, 2 * voxel_m_))
+    for (const Sphere& ball : balls_over_cubes(beyond, 2 * voxel_m_))
         level.unresolved.push_back({ball.center, ball.radius_m, level.unresolved_error_m});
 }
 
@@ -343,21 +340,6 @@ Chain::Written Chain::written(const BoundedMesh& mesh, double bound_m, double mo
     return out;
 }
 
-/// Balls round points, one for all that lie in a cube as wide as their radius.
-std::vector<Sphere> Chain::around(const std::vector<Vec3>& points, double radius_m) const {
-    std::vector<std::array<std::int64_t, 3>> cubes;
-    for (const Vec3& p : points) {
-        const Vec3 at = (p - box_.lo) / radius_m;
-        cubes.push_back({std::llround(at.x), std::llround(at.y), std::llround(at.z)});
-    }
-    std::sort(cubes.begin(), cubes.end());
-    cubes.erase(std::unique(cubes.begin(), cubes.end()), cubes.end());
-    std::vector<Sphere> balls;
-    for (const auto& [x, y, z] : cubes)
-        balls.push_back({box_.lo + Vec3{double(x), double(y), double(z)} * radius_m, radius_m});
-    return balls;
-}
-
 /// A level within a bound from a surface, which it leaves as its own: where it does not hold as
 /// decoded, or faces cross, what was there before stays. What no attempt mends is named. Returns
 /// false, and what was nearest to it in `level`, when that is nearly everywhere.
@@ -372,25 +354,27 @@ bool Chain::simplified(double bound_m, LabelledMesh& surface, LodLevel& level) c
             written(next.within(inner_m, kept, progress_), bound_m, max_move_m(bound_m), kSpeck);
         level = std::move(out.level);
         const double share = double(out.beyond.size()) / double(out.n_samples);
-        const bool last = attempt + 1 == kAttempts || share <= few;
+        const bool no_more =
+            attempt + 1 >= (out.crossings.empty() ? kAttempts : kAttemptsCrossing);
+        const bool last = no_more || share <= few;
         if (last && share <= kMostBeyond) {
-            for (const Sphere& ball : around(out.beyond, 2 * voxel_m_))
+            for (const Sphere& ball : balls_over_cubes(out.beyond, 2 * voxel_m_))
                 level.unresolved.push_back({ball.center, ball.radius_m, level.error_m});
             level.unresolved_error_m = std::max(level.unresolved_error_m, level.error_m);
             level.error_m = std::min(level.error_m, bound_m);
         }
-        if (level.error_m <= bound_m && (attempt + 1 == kAttempts || out.crossings.empty())) {
+        if (level.error_m <= bound_m && (no_more || out.crossings.empty())) {
             surface = next.surface();
             return true;
         }
-        if (attempt + 1 == kAttempts) {
+        if (no_more) {
             surface = start.surface();
             return false;
         }
         if (share > kMostBeyond)
             inner_m *= std::max(kTightest, 0.97 * bound_m / level.error_m);
         out.beyond.insert(out.beyond.end(), out.crossings.begin(), out.crossings.end());
-        const auto more = around(out.beyond, (2 << attempt) * voxel_m_);
+        const auto more = balls_over_cubes(out.beyond, (2 << attempt) * voxel_m_);
         kept.insert(kept.end(), more.begin(), more.end());
     }
 }
