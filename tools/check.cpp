@@ -33,7 +33,7 @@ MeshFile content(const SolidOptions& options, const Console& console) {
     if (!is_vdb(options.path))
         return read_mesh(options.path, options.mesh_settings(), console.progress);
     MeshFile file;
-    file.levels = {extract_uniform(*read_solid_vdb(options.path).solid, console.progress)};
+    file.levels = {extract_uniform(*read_solid_vdb(options.path, console.progress).solid, console.progress)};
     return file;
 }
 

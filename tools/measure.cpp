@@ -38,7 +38,7 @@ Measured measured(const SolidOptions& options, const std::filesystem::path& path
                   const Console& console) {
     Measured m;
     if (is_vdb(path)) {
-        m.grid = read_solid_vdb(path).solid;
+        m.grid = read_solid_vdb(path, console.progress).solid;
         m.mesh = extract_uniform(*m.grid, console.progress);
         m.volume_m3 = volume_m3(*m.grid);
     } else {

@@ -47,7 +47,7 @@ void parse_picture_size(const std::string& text, RenderSettings& settings) {
 
 std::vector<TriMesh> meshes_of(const RenderArgs& args, const Console& console) {
     if (is_vdb(args.file.path)) {
-        const VdbFile file = read_solid_vdb(args.file.path);
+        const VdbFile file = read_solid_vdb(args.file.path, console.progress);
         TriMesh mesh = extract_uniform(*file.solid, console.progress);
         mesh.normals = surface_normals(*file.solid, mesh.positions);
         return {std::move(mesh)};

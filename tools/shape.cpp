@@ -192,7 +192,7 @@ void run(ShapeArgs& args, const CLI::App& verb, const Console& console) {
         const MeshFormat format = *mesh_format(args.out);
         const std::string bytes =
             format_mesh(mesh, format, format_recipe(node, 0, args.settings.seed));
-        require_certificate(certify(parse_mesh(bytes, format, args.out.string()).levels.at(0)),
+        require_certificate(certify(parse_mesh(bytes, format, args.out.string(), {.is_own = true}).levels.at(0)),
                             args.out.string());
         write_file(args.out, bytes);
         json["triangles"] = mesh.triangles.size();

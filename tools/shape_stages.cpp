@@ -115,7 +115,7 @@ void write_stages(const ShapeSettings& settings, StageBump bump,
         console.may_write(mesh);
         console.may_write(picture);
         const std::string bytes = format_mesh(stage.mesh, MeshFormat::glb);
-        require_certificate(certify(parse_mesh(bytes, MeshFormat::glb, mesh.string()).levels.at(0)),
+        require_certificate(certify(parse_mesh(bytes, MeshFormat::glb, mesh.string(), {.is_own = true}).levels.at(0)),
                             mesh.string());
         write_file(mesh, bytes);
         RenderSettings look{.width = 360, .height = 360, .wireframe = !stage.lit};

@@ -124,7 +124,7 @@ Solid read_solid(const SolidOptions& options, const Console& console, Surfaces s
                         where +
                             ": a level set keeps its own voxels and units; drop --dim, --voxel, "
                             "--close, --shells, --unit and --up, or voxelize the mesh again");
-        VdbFile file = read_solid_vdb(options.path);
+        VdbFile file = read_solid_vdb(options.path, console.progress);
         solid.grid = file.solid;
         if (surfaces == Surfaces::wanted && recipe_solid(file.recipe))
             solid.field = field_of(*file.solid, file.recipe, options.path, console);

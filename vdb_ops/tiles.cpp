@@ -284,8 +284,8 @@ openvdb::FloatGrid::Ptr read_tile(const fs::path& folder, const Tile& tile) {
     return read_vdb(path).solid;
 }
 
-VdbFile read_solid_vdb(const fs::path& path) {
-    VdbFile file = read_vdb(path);
+VdbFile read_solid_vdb(const fs::path& path, Progress* progress) {
+    VdbFile file = read_vdb(path, progress);
     if (file.tile.empty())
         return file;
     const std::string where = base_name(path) + ": taihu_tile";

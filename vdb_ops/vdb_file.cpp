@@ -1,16 +1,17 @@
 #include "vdb_ops/vdb_file.h"
 
-#include <cmath>
 #include <sstream>
 
 #include <openvdb/io/Archive.h>
 #include <openvdb/io/File.h>
-#include <tbb/parallel_for.h>
 
 #include "stats/core/error.h"
 #include "stats/core/file.h"
+#include "stats/core/foreign.h"
 #include "stats/core/sha256.h"
 #include "stats/core/text.h"
+#include "vdb_ops/flat_grid_detail.h"
+#include "vdb_ops/foreign_vdb_detail.h"
 #include "vdb_ops/rasterize.h"
 
 namespace taihu {
@@ -20,24 +21,6 @@ constexpr const char *kRecipeKey = "taihu_recipe", *kTileKey = "taihu_tile";
 constexpr char kMagic[] = {' ', 'B', 'D', 'V', 0, 0, 0, 0};
 // magic 8, file version 4, library version 8, offsets flag 1: then 36 characters of id.
 constexpr std::size_t kIdAt = 21, kIdSize = 36;
-
-void check_finite(const openvdb::FloatGrid& grid, const std::string& where) {
-    std::vector<const openvdb::FloatTree::LeafNodeType*> leaves;
-    grid.tree().getNodes(leaves);
-    std::vector<char> bad(leaves.size(), 0);
-    tbb::parallel_for(std::size_t{0}, leaves.size(), [&](std::size_t i) {
-        const float* v = leaves[i]->buffer().data();
-        for (int k = 0; k < 512; ++k)
-            bad[i] |= !std::isfinite(v[k]);
-    });
-    for (std::size_t i = 0; i < bad.size(); ++i)
-        if (bad[i])
-            throw Error(Fault::bad_input, where + ": a voxel near (" +
-                                              std::to_string(leaves[i]->origin().x()) + ", " +
-                                              std::to_string(leaves[i]->origin().y()) + ", " +
-                                              std::to_string(leaves[i]->origin().z()) +
-                                              ") is not finite; write the level set again");
-}
 
 /// A 8-4-4-4-12 id from the hash of everything else in the file.
 void replace_id(std::string& bytes, const std::string& where) {
@@ -68,37 +51,55 @@ private:
 enum class GridKind { level_set, any };
 
 /// The first float grid of this kind in a file; null when there is none.
-openvdb::FloatGrid::Ptr first_grid(const std::filesystem::path& path, GridKind kind) {
+openvdb::FloatGrid::Ptr first_grid(const std::filesystem::path& path, GridKind kind,
+                                   Progress* progress) {
     const std::string where = path.string();
     openvdb::initialize();
+    std::string flat;
     {
         const std::string bytes = read_file(path); // regular, readable, of a size that memory takes
         if (bytes.size() < sizeof kMagic || bytes.compare(0, 4, kMagic, 4) != 0)
             throw Error(Fault::bad_input, where + ": not an OpenVDB file; give a .vdb");
+        flat = read_foreign("vdb", bytes, where, {kind == GridKind::any ? "any" : "level set"},
+                            progress);
     }
-    openvdb::FloatGrid::Ptr found;
-    try {
-        openvdb::io::File file(path.string());
-        file.open(false); // no delayed loading: the file may change under us
-        const auto grids = file.readAllGridMetadata();
-        for (const auto& grid : *grids)
-            if (!found && grid && grid->isType<openvdb::FloatGrid>() &&
-                (kind == GridKind::any || grid->getGridClass() == openvdb::GRID_LEVEL_SET))
-                found = openvdb::gridPtrCast<openvdb::FloatGrid>(file.readGrid(grid->getName()));
-        file.close();
-    } catch (const std::exception& e) {
-        throw Error(Fault::bad_input, where + ": cannot be read as OpenVDB (" +
-                                          printable(e.what(), 80) + "); write the file again");
-    }
-    return found;
+    if (flat.empty())
+        return nullptr;
+    FlatReader in(flat, where);
+    const auto grid = get_grid(in);
+    in.expect_end();
+    return grid;
 }
 
 } // namespace
 
-VdbFile read_vdb(const std::filesystem::path& path) {
+std::string flat_vdb(std::string_view /*bytes*/, const std::string& where,
+                     const std::vector<std::string>& words) {
+    const bool any = !words.empty() && words.front() == "any";
+    openvdb::initialize();
+    openvdb::FloatGrid::Ptr found;
+    openvdb::io::File file("/dev/stdin");
+    file.open(false); // no delayed loading
+    const auto grids = file.readAllGridMetadata();
+    for (const auto& grid : *grids)
+        if (!found && grid && grid->isType<openvdb::FloatGrid>() &&
+            (any || grid->getGridClass() == openvdb::GRID_LEVEL_SET))
+            found = openvdb::gridPtrCast<openvdb::FloatGrid>(file.readGrid(grid->getName()));
+    if (!found)
+        return {};
+    FlatWriter out;
+    try {
+        put_grid(out, *found);
+    } catch (const Error& e) {
+        throw Error(e.fault(), where + ": " + e.what());
+    }
+    return std::move(out.bytes);
+}
+
+VdbFile read_vdb(const std::filesystem::path& path, Progress* progress) {
     const std::string where = path.string();
     VdbFile result;
-    result.solid = first_grid(path, GridKind::level_set);
+    result.solid = first_grid(path, GridKind::level_set, progress);
     if (!result.solid)
         throw Error(Fault::bad_input,
                     where +
@@ -108,7 +109,6 @@ VdbFile read_vdb(const std::filesystem::path& path) {
     } catch (const Error& e) {
         throw Error(Fault::bad_input, where + ": " + e.what());
     }
-    check_finite(*result.solid, where);
     if (const auto recipe = result.solid->getMetadata<openvdb::StringMetadata>(kRecipeKey))
         result.recipe = recipe->value();
     if (const auto tile = result.solid->getMetadata<openvdb::StringMetadata>(kTileKey))
@@ -116,13 +116,12 @@ VdbFile read_vdb(const std::filesystem::path& path) {
     return result;
 }
 
-openvdb::FloatGrid::Ptr read_volume(const std::filesystem::path& path) {
+openvdb::FloatGrid::Ptr read_volume(const std::filesystem::path& path, Progress* progress) {
     const std::string where = path.string();
-    const auto grid = first_grid(path, GridKind::any);
+    const auto grid = first_grid(path, GridKind::any, progress);
     if (!grid)
         throw Error(Fault::bad_input,
                     where + ": holds no grid of floats; give a level set or a fog volume");
-    check_finite(*grid, where);
     return grid;
 }
 

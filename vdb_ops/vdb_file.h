@@ -4,6 +4,8 @@
 
 #include <openvdb/openvdb.h>
 
+#include "stats/core/progress.h"
+
 namespace taihu {
 
 struct VdbFile {
@@ -12,18 +14,20 @@ struct VdbFile {
     std::string tile;   ///< of a tile: JSON text of its box and of what it belongs to, or empty
 };
 
-/// The first level set of a .vdb file. That of a tile as it is: see read_solid_vdb().
+/// The first level set of a .vdb file. That of a tile as it is: see read_solid_vdb(). OpenVDB reads
+/// it in a program of its own (stats/core/foreign.h).
 /// \throws Error bad_input: not a .vdb, damaged, no float level set in it, a non-finite voxel, or
 /// as
-///   lattice_of(); io. OpenVDB's own messages are cut to one line.
-VdbFile read_vdb(const std::filesystem::path& path);
+///   lattice_of(); as read_foreign(); io.
+VdbFile read_vdb(const std::filesystem::path& path, Progress* progress = nullptr);
 
 /// The same, but a tile as a solid of its own, by tile_solid().
-VdbFile read_solid_vdb(const std::filesystem::path& path);
+VdbFile read_solid_vdb(const std::filesystem::path& path, Progress* progress = nullptr);
 
 /// The first grid of floats of a .vdb file, be it a level set or a fog volume.
-/// \throws Error bad_input: not a .vdb, damaged, no such grid, a non-finite voxel; io.
-openvdb::FloatGrid::Ptr read_volume(const std::filesystem::path& path);
+/// \throws Error as read_vdb().
+openvdb::FloatGrid::Ptr read_volume(const std::filesystem::path& path,
+                                    Progress* progress = nullptr);
 
 /// Write `solid` (named "surface") with `recipe` as the metadata taihu_recipe. The random id that
 /// OpenVDB writes into each file is replaced by one from the content: the same solid gives the same

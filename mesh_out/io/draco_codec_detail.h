@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "mesh_out/textured_mesh.h"
+#include "stats/core/progress.h"
 #include "stats/core/tri_mesh.h"
 
 namespace taihu {
@@ -39,6 +40,11 @@ struct DracoMesh {
 
 /// decode_draco() and the ids.
 DracoMesh decode_draco_mesh(std::string_view bytes, const std::string& where);
+
+/// The same, in a program of its own unless the stream is our own. \throws Error also as
+/// read_foreign().
+DracoMesh read_draco(std::string_view bytes, const std::string& where, bool is_own,
+                     Progress* progress);
 
 /// What encode_draco() made of a textured mesh.
 TexturedMesh decode_textured_draco(std::string_view bytes, const std::string& where);

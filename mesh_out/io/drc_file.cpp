@@ -7,8 +7,9 @@
 
 namespace taihu {
 
-MeshFile parse_drc(std::string_view bytes, const std::string& where) {
-    DracoMesh decoded = decode_draco_mesh(bytes, where + ":byte 0");
+MeshFile parse_drc(std::string_view bytes, const std::string& where, bool is_own,
+                   Progress* progress) {
+    DracoMesh decoded = read_draco(bytes, where + ":byte 0", is_own, progress);
     MeshFile file;
     file.draco = true;
     file.recipe = std::move(decoded.recipe);

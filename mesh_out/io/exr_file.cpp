@@ -15,8 +15,11 @@
 #include <ImfStringAttribute.h>
 #include <half.h>
 
+#include "mesh_out/io/foreign_formats_detail.h"
 #include "stats/core/error.h"
 #include "stats/core/file.h"
+#include "stats/core/flat.h"
+#include "stats/core/foreign.h"
 #include "stats/core/text.h"
 
 namespace taihu {
@@ -257,33 +260,64 @@ void write_exr(const std::filesystem::path& path, const ExrImage& exr, ExrSample
     write_file(path, stream.bytes);
 }
 
-ExrImage read_exr(const std::filesystem::path& path, std::span<const std::string> channels) {
-    const std::string bytes = read_file(path);
-    const std::string name = base_name(path);
-    HeaderWalk(bytes, name).check();
-    try {
-        StringInput stream(bytes);
-        Imf::InputFile file(stream);
-        const Imf::Header& header = file.header();
-        if (header.compression() == Imf::DWAA_COMPRESSION ||
-            header.compression() == Imf::DWAB_COMPRESSION)
-            throw Error(Fault::unsupported, name + ": DWA compression is lossy; save it with ZIP");
-        ExrImage out;
-        out.channels = chosen(header.channels(), channels, name);
-        out.image = empty_image(header, out.channels.size(), bytes.size(), name);
-        for (auto it = header.begin(); it != header.end(); ++it)
-            if (const auto* text = dynamic_cast<const Imf::StringAttribute*>(&it.attribute()))
-                out.attributes.emplace_back(it.name(), text->value());
-        const Imath::Box2i window = header.dataWindow();
-        file.setFrameBuffer(frame_of(out.image.pixels, out.image.width, out.channels, window.min));
-        file.readPixels(window.min.y, window.max.y);
-        return out;
-    } catch (const Error&) {
-        throw;
-    } catch (const std::exception& e) {
-        throw Error(Fault::bad_input,
-                    name + ": damaged EXR: " + printable(e.what(), 200) + "; save it again as EXR");
+std::string flat_exr(std::string_view bytes, const std::string& where,
+                     const std::vector<std::string>& channels) {
+    HeaderWalk(bytes, where).check();
+    StringInput stream(bytes);
+    Imf::InputFile file(stream);
+    const Imf::Header& header = file.header();
+    if (header.compression() == Imf::DWAA_COMPRESSION ||
+        header.compression() == Imf::DWAB_COMPRESSION)
+        throw Error(Fault::unsupported, where + ": DWA compression is lossy; save it with ZIP");
+    const std::vector<std::string> names = chosen(header.channels(), channels, where);
+    Image image = empty_image(header, names.size(), bytes.size(), where);
+    const Imath::Box2i window = header.dataWindow();
+    file.setFrameBuffer(frame_of(image.pixels, image.width, names, window.min));
+    file.readPixels(window.min.y, window.max.y);
+    FlatWriter out;
+    out.put<std::int32_t>(image.width);
+    out.put<std::int32_t>(image.height);
+    out.put<std::uint32_t>(static_cast<std::uint32_t>(names.size()));
+    for (const std::string& name : names)
+        out.put_text(name);
+    std::vector<std::pair<std::string, std::string>> texts;
+    for (auto it = header.begin(); it != header.end(); ++it)
+        if (const auto* text = dynamic_cast<const Imf::StringAttribute*>(&it.attribute()))
+            texts.emplace_back(it.name(), text->value());
+    out.put<std::uint32_t>(static_cast<std::uint32_t>(texts.size()));
+    for (const auto& [key, text] : texts) {
+        out.put_text(key);
+        out.put_text(text);
     }
+    out.put_all(std::span<const float>(image.pixels));
+    return std::move(out.bytes);
+}
+
+ExrImage read_exr(const std::filesystem::path& path, std::span<const std::string> channels) {
+    const std::string name = base_name(path);
+    const std::string flat =
+        read_foreign("exr", read_file(path), name, {channels.begin(), channels.end()});
+    FlatReader in(flat, name);
+    const auto width = in.get<std::int32_t>(), height = in.get<std::int32_t>();
+    const auto n_channels = in.get<std::uint32_t>();
+    ExrImage out;
+    for (std::uint32_t c = 0; c < n_channels; ++c)
+        out.channels.push_back(in.get_text());
+    const auto n_texts = in.get<std::uint32_t>();
+    for (std::uint32_t i = 0; i < n_texts; ++i) {
+        const std::string key = in.get_text();
+        out.attributes.emplace_back(key, in.get_text());
+    }
+    std::vector<float> pixels = in.get_all<std::vector<float>>();
+    in.expect_end();
+    const std::uint64_t n = std::uint64_t(std::max(width, 0)) * std::uint64_t(std::max(height, 0));
+    if (n == 0 || n_channels < 1 || pixels.size() % n != 0 || pixels.size() / n != n_channels)
+        in.fail("is no picture");
+    out.image.width = width;
+    out.image.height = height;
+    out.image.channels = static_cast<int>(n_channels);
+    out.image.pixels = std::move(pixels);
+    return out;
 }
 
 } // namespace taihu

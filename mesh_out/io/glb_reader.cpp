@@ -50,8 +50,8 @@ std::string path_of(const char* list, std::uint64_t index) {
 
 class GlbReader {
 public:
-    GlbReader(std::string_view bytes, const std::string& where, Progress* progress)
-        : document_(bytes, where), where_(where), progress_(progress) {}
+    GlbReader(std::string_view bytes, const std::string& where, bool is_own, Progress* progress)
+        : document_(bytes, where), where_(where), is_own_(is_own), progress_(progress) {}
 
     MeshFile read();
 
@@ -85,6 +85,7 @@ private:
 
     GlbDocument document_;
     const std::string& where_;
+    bool is_own_;
     Progress* progress_;
     MeshFile file_;
     std::vector<char> visited_;
@@ -426,8 +427,8 @@ void GlbReader::read_draco(const Json& primitive, const Json& extension, const s
                            const Placement& placement, TriMesh& level) {
     const std::string_view stream = document_.view(
         document_.needed_whole(extension, "bufferView", path + ".KHR_draco_mesh_compression"));
-    const DracoMesh decoded =
-        decode_draco_mesh(stream, where_ + ":byte " + std::to_string(document_.offset(stream)));
+    const DracoMesh decoded = taihu::read_draco(
+        stream, where_ + ":byte " + std::to_string(document_.offset(stream)), is_own_, progress_);
     check_draco(decoded, primitive, extension, path);
     spend(decoded.mesh.positions.size() + decoded.mesh.triangles.size(), path);
     file_.draco = true;
@@ -462,8 +463,9 @@ MeshFile GlbReader::read() {
 
 } // namespace
 
-MeshFile parse_glb(std::string_view bytes, const std::string& where, Progress* progress) {
-    return GlbReader(bytes, where, progress).read();
+MeshFile parse_glb(std::string_view bytes, const std::string& where, bool is_own,
+                   Progress* progress) {
+    return GlbReader(bytes, where, is_own, progress).read();
 }
 
 } // namespace taihu

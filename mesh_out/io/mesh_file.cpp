@@ -37,7 +37,7 @@ std::optional<MeshFormat> format_by_content(std::string_view bytes) {
     return std::nullopt;
 }
 
-MeshFile parse_as(std::string_view bytes, MeshFormat format, const std::string& where,
+MeshFile parse_as(std::string_view bytes, MeshFormat format, const std::string& where, bool is_own,
                   Progress* progress) {
     switch (format) {
     case MeshFormat::obj:
@@ -49,11 +49,11 @@ MeshFile parse_as(std::string_view bytes, MeshFormat format, const std::string& 
     case MeshFormat::off:
         return parse_off(bytes, where, progress);
     case MeshFormat::drc:
-        return parse_drc(bytes, where);
+        return parse_drc(bytes, where, is_own, progress);
     case MeshFormat::glb:
         break;
     }
-    return parse_glb(bytes, where, progress);
+    return parse_glb(bytes, where, is_own, progress);
 }
 
 } // namespace
@@ -94,7 +94,7 @@ MeshFile parse_mesh(std::string_view bytes, MeshFormat format, const std::string
     if (content && *content != format && format != MeshFormat::stl)
         throw Error(Fault::bad_input, where + ":1: the content is " + name_of(*content) +
                                           ", the name says " + name_of(format) + "; rename it");
-    MeshFile file = parse_as(bytes, format, where, progress);
+    MeshFile file = parse_as(bytes, format, where, settings.is_own, progress);
     file.format = format;
     for (TriMesh& level : file.levels) {
         if (level.triangles.empty())

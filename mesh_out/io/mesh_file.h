@@ -25,6 +25,7 @@ enum class UpAxis { y, z };
 struct MeshReadSettings {
     double unit_m = 1; ///< length of one file unit [m], > 0; 1 for a glTF that keeps to its rules
     UpAxis up = UpAxis::y; ///< z: (x, y, z) becomes (x, z, -y)
+    bool is_own = false; ///< bytes that this program has just made: Draco's decoder may trust them
 };
 
 /// What a mesh file held. Every face becomes triangles, is counted in n_degenerate_faces, or is an
@@ -52,11 +53,12 @@ struct MeshFile {
 /// GLB: all triangle primitives of the default scene with their node transforms; points
 /// and lines, skins and morph targets are ignored; at most 2^24 vertices and triangles, or one per
 /// byte. A GLB whose Draco data do not match its accessors is refused; accessor minima and maxima
-/// may be off by 1/256 of the largest side, because many encoders state those of their input.
+/// may be off by 1/256 of the largest side, because many encoders state those of their input. Draco
+/// streams are decoded in a program of their own (stats/core/foreign.h).
 /// \throws Error bad_input `<file>:<line or byte>: <what>; <remedy>` for anything cut short, a word
 ///   for a number, a non-finite coordinate, an index out of range, a count that the size of the
-///   file cannot hold, or no face at all; io; unsupported for an unknown extension or a required
-///   glTF extension that is not known here.
+///   file cannot hold, or no face at all; as read_foreign(); io; unsupported for an unknown
+///   extension or a required glTF extension that is not known here.
 MeshFile read_mesh(const std::filesystem::path& path, const MeshReadSettings& settings = {},
                    Progress* progress = nullptr);
 

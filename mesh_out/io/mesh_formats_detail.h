@@ -13,8 +13,11 @@ MeshFile parse_obj(std::string_view bytes, const std::string& where, Progress* p
 MeshFile parse_off(std::string_view bytes, const std::string& where, Progress* progress);
 MeshFile parse_ply(std::string_view bytes, const std::string& where, Progress* progress);
 MeshFile parse_stl(std::string_view bytes, const std::string& where, Progress* progress);
-MeshFile parse_glb(std::string_view bytes, const std::string& where, Progress* progress);
-MeshFile parse_drc(std::string_view bytes, const std::string& where);
+/// \param is_own  as MeshReadSettings.
+MeshFile parse_glb(std::string_view bytes, const std::string& where, bool is_own,
+                   Progress* progress);
+MeshFile parse_drc(std::string_view bytes, const std::string& where, bool is_own,
+                   Progress* progress);
 
 std::string format_obj(const TriMesh& mesh, const std::string& recipe);
 std::string format_off(const TriMesh& mesh, const std::string& recipe);

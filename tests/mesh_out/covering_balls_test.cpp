@@ -18,9 +18,8 @@ std::vector<Vec3> some_points() {
 }
 
 bool covered(const std::vector<Sphere>& balls, const Vec3& p) {
-    return std::any_of(balls.begin(), balls.end(), [&](const Sphere& s) {
-        return length(p - s.center) <= s.radius_m;
-    });
+    return std::any_of(balls.begin(), balls.end(),
+                       [&](const Sphere& s) { return length(p - s.center) <= s.radius_m; });
 }
 
 TEST(CoveringBalls, CoverAllPoints) {
@@ -46,7 +45,8 @@ TEST(CoveringBalls, ThoseApartHoldNoCentreOfAnother) {
 }
 
 TEST(CoveringBalls, CubesAreCoveredWhole) {
-    const auto balls = balls_over_cubes(std::vector<Vec3>{{0.26, 0.26, 0.26}, {0.7, 0.7, 0.7}}, 0.5);
+    const auto balls =
+        balls_over_cubes(std::vector<Vec3>{{0.26, 0.26, 0.26}, {0.7, 0.7, 0.7}}, 0.5);
     ASSERT_EQ(balls.size(), 1u);
     EXPECT_TRUE(covered(balls, {0.26, 0.74, 0.26}));
 }

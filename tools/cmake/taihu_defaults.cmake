@@ -43,6 +43,7 @@ function(taihu_tests module)
   target_include_directories(${module}_tests PRIVATE ${PROJECT_SOURCE_DIR})
   target_compile_definitions(${module}_tests PRIVATE TAIHU_DATA="${PROJECT_SOURCE_DIR}/data")
   target_link_libraries(${module}_tests PRIVATE ${arg_LIBRARIES} GTest::gmock_main)
+  add_dependencies(${module}_tests taihu_reader) # what they read, it reads for them
   gtest_discover_tests(${module}_tests TEST_PREFIX ${module}/ DISCOVERY_MODE PRE_TEST
     PROPERTIES LABELS unit TIMEOUT 300)
 endfunction()
