@@ -45,7 +45,7 @@ constexpr double kLeastMove = 1.0 / 16; ///< of what rounding may take, where fa
 constexpr double kLost = 0.25;          ///< of the finest bound: not worth a look
 constexpr double kNearly = 0.75;        ///< of a bound, at one point: beyond it beside
 constexpr double kSpeck = 2, kLargestSpeck = 16; ///< bounds: pieces that long are dropped
-constexpr int kAttempts = 2, kAttemptsCrossing = 4, kMostLevels = 8, kMostBits = 18;
+constexpr int kAttempts = 2, kMostAttempts = 4, kMostLevels = 8, kMostBits = 18;
 
 std::string shown(double value) {
     return rounded(value, 6);
@@ -354,8 +354,8 @@ bool Chain::simplified(double bound_m, LabelledMesh& surface, LodLevel& level) c
             written(next.within(inner_m, kept, progress_), bound_m, max_move_m(bound_m), kSpeck);
         level = std::move(out.level);
         const double share = double(out.beyond.size()) / double(out.n_samples);
-        const bool no_more =
-            attempt + 1 >= (out.crossings.empty() ? kAttempts : kAttemptsCrossing);
+        const bool is_fair = out.crossings.empty() && share <= kMostBeyond;
+        const bool no_more = attempt + 1 >= (is_fair ? kAttempts : kMostAttempts);
         const bool last = no_more || share <= few;
         if (last && share <= kMostBeyond) {
             for (const Sphere& ball : balls_over_cubes(out.beyond, 2 * voxel_m_))

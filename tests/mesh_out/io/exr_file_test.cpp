@@ -10,6 +10,7 @@
 #include <OpenEXR/ImfOutputFile.h>
 #include <OpenEXR/ImfTiledOutputFile.h>
 
+#include "mesh_out/io/foreign_formats_detail.h"
 #include "stats/core/file.h"
 #include "tests/support/errors.h"
 #include "tests/support/scratch.h"
@@ -114,7 +115,7 @@ TEST(ExrFile, CutShortAnywhereIsRefusedInOneLine) {
     const Scratch folder;
     write_exr(folder / "a.exr", sample({"Y"}));
     const std::string bytes = read_file(folder / "a.exr");
-    for (std::size_t n = 0; n < bytes.size(); n += 7) {
+    for (std::size_t n = 0; n < bytes.size(); n += 101) {
         spill(folder / "cut.exr", std::string_view(bytes).substr(0, n));
         expect_error(Fault::bad_input, "cut.exr: ", [&] { read_exr(folder / "cut.exr"); });
     }
@@ -129,12 +130,17 @@ TEST(ExrFile, WithAnyByteChangedIsReadOrRefused) {
         for (const char to : {'\xff', '\x00', '\x7f'}) {
             std::string changed = bytes;
             changed[i] = to;
+            try { // as in the program that reads for others
+                EXPECT_LE(flat_exr(changed, "b.exr", {}).size(), std::size_t{1} << 24); // of 4 kB
+            } catch (const std::exception&) {
+                ++n_refused;
+            }
+            if (i % 100 != 0)
+                continue;
             spill(folder / "b.exr", changed);
             try {
-                const ExrImage image = read_exr(folder / "b.exr");
-                EXPECT_LE(image.image.pixels.size(), std::size_t{1} << 22); // of 4 kB, unpacked
+                read_exr(folder / "b.exr");
             } catch (const Error& e) {
-                ++n_refused;
                 EXPECT_EQ(std::string(e.what()).rfind("b.exr: ", 0), 0u) << e.what();
             }
         }

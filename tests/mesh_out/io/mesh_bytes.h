@@ -51,7 +51,7 @@ inline void expect_sound(const MeshFile& file) {
 /// The mesh that `bytes` hold, or nothing when they are refused; anything else than Error escapes.
 inline std::optional<MeshFile> try_parse(std::string_view bytes, MeshFormat format) {
     try {
-        return parse_mesh(bytes, format, "rock");
+        return parse_mesh(bytes, format, "rock", {.is_own = true}); // no process for each
     } catch (const Error& e) {
         EXPECT_THAT(e.what(), testing::StartsWith("rock:"));
         return std::nullopt;
