@@ -4,6 +4,7 @@
 #include <cmath>
 #include <limits>
 #include <numbers>
+#include <optional>
 #include <string>
 
 #include "mesh_out/bounded_surface_detail.h"
@@ -20,7 +21,10 @@ constexpr double kBlockEdges = 48;     ///< edges along a block, as they are on 
 constexpr double kShift = 3. / 7;      ///< of a block from pass to pass
 constexpr double kCentredShare = 0.75; ///< of the bound, for errors that balancing will centre
 constexpr double kCountTolerance = 0.02;
-constexpr int kMostTrials = 24;
+constexpr int kMostTrials = 16;
+constexpr double kMostGrowth = 8;   ///< of a bound from trial to trial
+constexpr double kNarrow = 1.01;    ///< brackets in which no other number is sought
+constexpr double kLeastStep = 0.15; ///< of a bracket
 constexpr int kMostTries = 3; ///< to balance and mend one simplified surface without crossings
 constexpr int kMostFreezes = 2;
 constexpr double kFirstBound = 0.1; ///< of a spacing, where a search begins
@@ -167,43 +171,62 @@ BoundedMesh BoundedSimplifier::to_triangles(std::size_t n, Progress* progress) {
             std::to_string(n) + " triangles of " + std::to_string(surface_.mesh.triangles.size()) +
                 "; must be at least 4 and no more than there are");
     // Counts fall about as the bound to the power -2/3, and never rise by much: start there, then
-    // keep a bracket. Too coarse a trial is thrown away; one too fine is what the next starts from.
-    const auto fits = [n](std::size_t count) {
-        return count <= n && static_cast<double>(count) >= (1 - kCountTolerance) * double(n);
+    // keep a bracket. Too coarse a trial is kept in case that nothing is nearer; one too fine is
+    // what the next starts from.
+    struct Trial {
+        double bound_m = 0, count = 0;
     };
-    double fine = bound_m_, coarse = 0;
-    double bound = fine > 0 ? fine : kFirstBound * settings_.spacing_m;
+    const double wanted = (1 - kCountTolerance / 2) * double(n);
     Box box;
     for (const Vec3& p : surface_.mesh.positions)
         box.include(p);
-    for (int trial = 0; trial < kMostTrials && bound < box.longest(); ++trial) {
+    const double most_m = box.longest() / 4;
+    Trial fine{bound_m_}, coarse;
+    double bound_m = fine.bound_m > 0 ? fine.bound_m : kFirstBound * settings_.spacing_m;
+    std::optional<std::pair<BoundedMesh, Surface>> best;
+    std::size_t fewest = surface_.mesh.triangles.size();
+    for (int trial = 0; trial < kMostTrials; ++trial) {
         Surface collapsed;
-        BoundedMesh out = level(bound, {}, collapsed, progress);
+        BoundedMesh out = level(bound_m, {}, collapsed, progress);
         const std::size_t count = out.mesh.triangles.size();
+        fewest = std::min(fewest, count);
+        const Trial here{bound_m, double(count)};
         if (count > n) {
-            fine = bound;
+            fine = here;
             surface_ = std::move(collapsed);
-            bound_m_ = bound;
-        } else if (fits(count)) {
-            surface_ = std::move(collapsed);
-            bound_m_ = bound;
-            return out;
+            bound_m_ = bound_m;
         } else {
-            coarse = bound;
+            coarse = here;
+            if (!best || count > best->first.mesh.triangles.size())
+                best.emplace(std::move(out), std::move(collapsed));
+            if (here.count >= (1 - kCountTolerance) * double(n))
+                break;
         }
-        const double guess =
-            bound * std::pow(static_cast<double>(count) / (0.99 * static_cast<double>(n)), 1.5);
-        if (coarse == 0)
-            bound = std::max(guess, 1.05 * fine);
-        else if (fine > 0)
-            bound = std::clamp(guess, fine + 0.1 * (coarse - fine), coarse - 0.1 * (coarse - fine));
-        else
-            bound = std::min(guess, 0.95 * coarse);
+        const double guess_m = bound_m * std::pow(here.count / wanted, 1.5);
+        if (coarse.bound_m == 0) {
+            if (bound_m >= most_m)
+                break;
+            bound_m = std::min(std::clamp(guess_m, 1.05 * bound_m, kMostGrowth * bound_m), most_m);
+        } else if (fine.count == 0) {
+            bound_m = std::max(std::min(guess_m, 0.95 * bound_m), fine.bound_m);
+            if (bound_m == coarse.bound_m)
+                break; // coarser than that it was before
+        } else {
+            if (coarse.bound_m < kNarrow * fine.bound_m)
+                break;
+            const double at = std::log(fine.count / wanted) / std::log(fine.count / coarse.count);
+            bound_m = fine.bound_m * std::pow(coarse.bound_m / fine.bound_m,
+                                              std::clamp(at, kLeastStep, 1 - kLeastStep));
+        }
     }
-    throw Error(Fault::numeric,
-                std::string(kWhere) + ": " + std::to_string(n) +
-                    " triangles are too few for its rims and tunnels, there is nothing between " +
-                    std::to_string(surface_.mesh.triangles.size()) + " and that; ask for more");
+    if (!best)
+        throw Error(Fault::numeric, std::string(kWhere) + ": " + std::to_string(n) +
+                                        " triangles are too few for its rims and tunnels, the "
+                                        "fewest found are " +
+                                        std::to_string(fewest) + "; ask for more");
+    surface_ = std::move(best->second);
+    bound_m_ = best->first.bound_m;
+    return std::move(best->first);
 }
 
 } // namespace taihu

@@ -59,9 +59,9 @@ public:
     /// \throws Error bad_argument: another bound; cancelled: within one block.
     BoundedMesh within(double bound_m, std::span<const Sphere> kept = {},
                        Progress* progress = nullptr);
-    /// At most `n`, and within 2 % of it, by searching the bound from that of the call before.
-    /// \throws Error bad_argument: n below 4 or above what there is; numeric: no bound up to the
-    ///   size of the solid leads there; cancelled.
+    /// At most `n`, and within 2 % of it where any bound leads there, by searching it from that of
+    /// the call before. \throws Error bad_argument: n below 4 or above what there is; numeric: all
+    ///   bounds up to a quarter of the solid leave more; cancelled.
     BoundedMesh to_triangles(std::size_t n, Progress* progress = nullptr);
 
     /// On the surface, of the last level, or as it came.

@@ -45,6 +45,7 @@ constexpr double kLeastMove = 1.0 / 16; ///< of what rounding may take, where fa
 constexpr double kLost = 0.25;          ///< of the finest bound: not worth a look
 constexpr double kNearly = 0.75;        ///< of a bound, at one point: beyond it beside
 constexpr double kSpeck = 2, kLargestSpeck = 16; ///< bounds: pieces that long are dropped
+constexpr double kNearCount = 0.97;              ///< of the triangles asked for: not said
 constexpr int kAttempts = 2, kMostAttempts = 4, kMostLevels = 8, kMostBits = 18;
 
 std::string shown(double value) {
@@ -453,6 +454,9 @@ LodChain Chain::make() {
             chain.note = std::to_string(j) + " of " + std::to_string(n) + " levels: " + why;
             break;
         }
+        if (double(level.certificate.n_triangles) < kNearCount * double(goal.n_triangles))
+            chain.note = "level " + std::to_string(j) + ": no bound leads nearer to " +
+                         std::to_string(goal.n_triangles) + " triangles";
         if (!made && !before)
             throw Error(Fault::numeric, "lod: the bound " + shown(level.bound_m) +
                                             " m cannot be met, the best mesh is " +

@@ -53,7 +53,7 @@ struct LodChain {
     /// About parts of the field's surface that no level has, since no voxel sees them, more than
     /// two voxels from all that is seen: bubbles and specks narrower than a voxel.
     std::vector<Sphere> unseen;
-    std::string note;                      ///< why there are fewer levels than asked for, or empty
+    std::string note; ///< why there are fewer levels or triangles than asked for
 };
 
 /// Levels of detail of a solid under world-space bounds, sharp where primitives of the field meet.

@@ -45,6 +45,7 @@ SurfaceFile format_surface(const openvdb::FloatGrid& solid, const Field* field, 
         file.bound_m = only.bound_m;
         file.error_m = only.error_m;
         file.n_unseen = chain.unseen.size();
+        file.note = std::move(chain.note);
         file.n_unresolved = only.unresolved.size();
         file.unresolved_error_m = only.unresolved_error_m;
         level = std::move(only.encoded);

@@ -30,6 +30,7 @@ struct SurfaceFile {
     std::size_t n_unresolved = 0;  ///< places where the bound is not promised
     double unresolved_error_m = 0; ///< there
     std::size_t n_unseen = 0;      ///< LodChain::unseen
+    std::string note;              ///< LodChain::note
 };
 
 /// The surface of a solid in any mesh format, certified from the bytes themselves.

@@ -340,6 +340,8 @@ nlohmann::ordered_json write_solid(const std::filesystem::path& path,
                     file.bound_m, file.bytes.size());
         say_unresolved(path.string(), file.n_unresolved, file.unresolved_error_m, console);
         say_unseen(path.string(), file.n_unseen, console);
+        if (!file.note.empty())
+            console.say("{}: {}", path.string(), file.note);
     }
     return json;
 }

@@ -114,6 +114,7 @@ TEST(Lod, SaysWhichNumberOfTrianglesIsTooSmall) {
         make_lods(*holed_rock(), &holed_field(), {.levels = {{0, 3000}, {0, 5}}});
     EXPECT_EQ(chain.levels.size(), 1u);
     EXPECT_THAT(chain.note, HasSubstr("1 of 2 levels: simplify: 5 triangles are too few"));
+    EXPECT_THAT(chain.note, HasSubstr("the fewest found are"));
 }
 
 TEST(Lod, TakesALevelSetForItsOwnField) {

@@ -41,8 +41,6 @@ void judge(std::uint64_t seed, Recorder& out) {
     const RecipeSolid solid = make_recipe(recipe.text, "recipe", {});
     const LabelledMesh full = extract(*solid.solid, solid.field.get());
     const Certificate before = certify({full.positions, full.triangles, {}});
-    if (!before.holds())
-        out.failed("no certificate before simplification", faults(before).front());
     out.add("surfaces that cross themselves before simplification",
             before.n_self_intersections > 0);
     const SurfaceFile file = format_surface(*solid.solid, solid.field.get(), MeshFormat::ply,
