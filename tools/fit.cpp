@@ -6,7 +6,7 @@
 #include "stats/bootstrap.h"
 #include "stats/chi_squared.h"
 #include "stats/core/error.h"
-#include "stats/core/file.h"
+#include "stats/core/file_set.h"
 #include "stats/core/text.h"
 #include "stats/expect.h"
 #include "stats/io/law_file.h"
@@ -327,15 +327,17 @@ void run(FitArgs& args, const Console& console) {
     tell(ranking, sample, console);
     for (const std::string& finding : assessment.findings)
         console.say_text(finding);
-    if (!args.report.empty()) {
-        write_file(args.report,
-                   format_report(args, measurements, ranking, assessment, photos, console));
+    OutputFiles outputs;
+    if (!args.report.empty())
+        outputs.add(args.report,
+                    format_report(args, measurements, ranking, assessment, photos, console));
+    outputs.add(args.out, law);
+    check_cancelled(console.progress);
+    outputs.publish();
+    if (!args.report.empty())
         console.say("{}: the report", args.report.string());
-    }
-    if (!args.out.empty()) {
-        write_file(args.out, law);
+    if (!args.out.empty())
         console.say("{}: the law", args.out.string());
-    }
     auto json = nlohmann::ordered_json::parse(law);
     if (!asked)
         return console.result(json);

@@ -6,7 +6,7 @@
 #include "mesh_out/io/exr_file.h"
 #include "mesh_out/io/image_file.h"
 #include "stats/core/error.h"
-#include "stats/core/file.h"
+#include "stats/core/file_set.h"
 #include "stats/core/text.h"
 #include "stats/number_detail.h"
 #include "tools/console.h"
@@ -237,7 +237,13 @@ nlohmann::ordered_json make_tile(const ReliefArgs& args, Plan plan, const Consol
     if (plan.departure_m)
         scale_to(*plan.departure_m, plan.settings, tile, console);
     const ReliefSettings& s = plan.settings;
+    OutputFiles preview;
+    if (!args.preview.empty())
+        preview.add(args.preview, format_png(relief_picture(tile, plan.material), PngValues::light,
+                                             base_name(args.preview)));
+    check_cancelled(console.progress);
     write_tile(args, s, tile);
+    preview.publish();
     const auto [lo, hi] =
         std::minmax_element(tile.heights.pixels.begin(), tile.heights.pixels.end());
     const std::string where = args.out.string();
@@ -259,7 +265,6 @@ nlohmann::ordered_json make_tile(const ReliefArgs& args, Plan plan, const Consol
         json["roughness"] = json_of(fitted);
     }
     if (!args.preview.empty()) {
-        write_image(args.preview, relief_picture(tile, plan.material));
         console.say("{}: lit from the upper left", args.preview.string());
         json["preview"] = args.preview.string();
     }
