@@ -124,6 +124,7 @@ void write_together(const BakedFiles& files, std::optional<FileSet>& maps, std::
     outputs.add(files.report, report.dump(2) + "\n");
     if (maps)
         maps->list();
+    const Publishing together;
     check_cancelled(console.progress);
     if (maps)
         maps->publish(kFileListName);

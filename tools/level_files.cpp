@@ -47,7 +47,7 @@ nlohmann::ordered_json manifest_level(const LodChain& chain, std::size_t j, doub
 
 /// All in the folder, the manifest as the last; the report too, where that is its place.
 void write_split(const LevelFiles& files, const LodChain& chain, const GlbSettings& settings,
-                 const std::string& report) {
+                 const std::string& report, const Progress* progress) {
     nlohmann::ordered_json manifest = {{"taihu_manifest", 1},
                                        {"fov_deg", files.fov_deg},
                                        {"screen_height_px", kScreenHeight_px},
@@ -70,6 +70,8 @@ void write_split(const LevelFiles& files, const LodChain& chain, const GlbSettin
         apart.add(files.report, report);
     }
     set.add(kManifest, manifest.dump(2) + "\n");
+    const Publishing together;
+    check_cancelled(progress);
     set.publish(kManifest);
     apart.publish();
 }
@@ -187,13 +189,13 @@ nlohmann::ordered_json write_levels(const LevelFiles& files, const openvdb::Floa
     if (lod.at_foot)
         glb.shift = foot_shift(chain.levels.front().certificate.box);
     const std::string report = format_report(chain, base_name(files.out));
-    check_cancelled(console.progress);
     if (files.split) {
-        write_split(files, chain, glb, report);
+        write_split(files, chain, glb, report, console.progress);
     } else {
         OutputFiles outputs;
         outputs.add(files.out, format_glb(chain, glb));
         outputs.add(files.report, report);
+        check_cancelled(console.progress);
         outputs.publish();
     }
     tell(chain, files.out.string(), console);

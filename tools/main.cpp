@@ -1,5 +1,4 @@
 // The command `taihu`: verbs over files. Parses, calls, prints; the work is in the modules.
-#include <atomic>
 #include <cstdio>
 #include <exception>
 #include <new>
@@ -39,10 +38,7 @@ int fail_foreign(const std::exception& e) {
 
 /// For what is thrown where nobody can catch it, as in a thread of TBB that cannot start another.
 [[noreturn]] void on_terminate() {
-    static std::atomic_flag is_ending; // of several threads the first speaks
-    if (is_ending.test_and_set())
-        for (;;)
-            ::pause();
+    claim_the_end();
     int code = kBug;
     try {
         discard_temporaries();
@@ -138,11 +134,13 @@ int run(int argc, char** argv) {
         return usage_error(app, argc, argv, e);
     } catch (const Error& e) {
         progress.reset();
+        claim_the_end();
         if (e.fault() == Fault::cancelled && stop_signal() != 0)
-            return fail(kSignalled + stop_signal(), "stopped; no output was written");
+            return fail(kSignalled + stop_signal(), kStopped);
         return fail(e.fault() == Fault::bad_argument ? kUsage : kFailed, e.what());
     } catch (const std::exception& e) {
         progress.reset();
+        claim_the_end();
         return fail_foreign(e);
     }
     return kDone;

@@ -155,7 +155,7 @@ std::vector<std::string> render_turn(const RenderArgs& args, const TriMesh& mesh
                         "name for a file each");
     std::optional<FileSet> pictures; // of one folder, whatever else is in it
     if (apart)
-        pictures.emplace(args.out.has_parent_path() ? args.out.parent_path() : ".");
+        pictures.emplace(args.out.parent_path());
     Image sheet = apart ? Image() : Image(columns * s.width, rows * s.height, 3);
     std::vector<std::string> files;
     for (int i = 0; i < n; ++i) {

@@ -225,11 +225,13 @@ void run(SectionArgs args, const Console& console) {
         const PhotoTotals totals =
             write_photos(cut, *in.solid.grid, in.known, args, photo_settings, *photos, console);
         photos->list();
-        check_cancelled(console.progress);
-        photos->publish(kFileListName);
         tell_photos(totals, args, console);
         json["photos"] = photos_json(totals, args);
     }
+    const Publishing together;
+    check_cancelled(console.progress);
+    if (photos)
+        photos->publish(kFileListName);
     table.publish();
     console.result(json);
 }

@@ -156,6 +156,7 @@ void run(ShapeArgs& args, const CLI::App& verb, const Console& console) {
         args.settings.around = args.exponents.back();
     }
     const TriMesh mesh = shape_mesh(args.settings); // refuses settings out of range
+    check_cancelled(console.progress);
     check_solid_path(args.out);
     console.may_write(args.out);
     std::unique_ptr<FileSet> stages;

@@ -106,7 +106,8 @@ private:
 
 } // namespace
 
-FileSet::FileSet(fs::path folder) : folder_(std::move(folder)), is_new_(!is_folder(folder_)) {
+FileSet::FileSet(fs::path folder)
+    : folder_(folder.empty() ? fs::path(".") : std::move(folder)), is_new_(!is_folder(folder_)) {
     std::error_code ignored;
     if (folder_.has_relative_path() && !folder_.has_filename())
         folder_ = folder_.parent_path(); // without the slash at its end
@@ -148,6 +149,7 @@ void FileSet::list() {
 }
 
 void FileSet::publish(const std::string& last, std::span<const std::string> gone) {
+    const Publishing together;
     if (is_new_)
         return place_new(*temporary_, folder_);
     std::vector<std::string> names = files_in(temporary_->path());
@@ -178,6 +180,7 @@ void OutputFiles::add(const fs::path& path, std::string_view bytes) {
 }
 
 void OutputFiles::publish() {
+    const Publishing together;
     for (OutputFile& file : files_)
         file.publish();
     files_.clear();
@@ -194,6 +197,7 @@ const fs::path& WorkFolder::path() const {
 }
 
 void WorkFolder::publish() {
+    const Publishing together;
     if (!is_folder(goal_))
         return place_new(*temporary_, goal_);
     if (::renameat2(AT_FDCWD, path().c_str(), AT_FDCWD, goal_.c_str(), RENAME_EXCHANGE) != 0) {

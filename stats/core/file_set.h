@@ -22,7 +22,7 @@ inline constexpr const char* kFileListName = "files.json";
 class FileSet {
 public:
     /// \param folder  for the files: there already, where it may hold others, or to be made, with
-    ///   the folders that it is in.
+    ///   the folders that it is in; empty: the current one.
     explicit FileSet(std::filesystem::path folder);
     ~FileSet();
     FileSet(const FileSet&) = delete;
@@ -58,6 +58,15 @@ public:
 
 private:
     std::list<OutputFile> files_;
+};
+
+/// Several publications that are one: discard_temporaries() waits while this lives.
+class Publishing {
+public:
+    Publishing();
+    ~Publishing();
+    Publishing(const Publishing&) = delete;
+    Publishing& operator=(const Publishing&) = delete;
 };
 
 /// A folder that takes its name with all that is in it: until publish() it has a temporary one

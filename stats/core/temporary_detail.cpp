@@ -2,6 +2,7 @@
 
 #include <array>
 #include <cerrno>
+#include <chrono>
 #include <cstring>
 #include <fcntl.h>
 #include <mutex>
@@ -16,6 +17,7 @@
 
 #include "stats/core/error.h"
 #include "stats/core/file.h"
+#include "stats/core/file_set.h"
 
 namespace taihu {
 namespace {
@@ -27,7 +29,7 @@ constexpr std::size_t kNLetters = 6;
 
 /// Those of this process that there are.
 struct Live {
-    std::mutex guard;
+    std::recursive_timed_mutex guard;
     std::set<const Temporary*> temporaries;
 };
 Live& live() {
@@ -121,6 +123,7 @@ Temporary::~Temporary() {
         const std::lock_guard lock(live().guard);
         live().temporaries.erase(this);
     }
+    descriptor_.reset(-1); // removing a folder takes one, and there may be no other
     discard();
 }
 
@@ -138,11 +141,18 @@ void Temporary::rename(const fs::path& to) {
 }
 
 void discard_temporaries() noexcept {
-    const std::unique_lock lock(live().guard,
-                                std::try_to_lock); // the thread that has it may be ours
-    if (lock)
+    // What is being published takes its place first. Not for ever: whoever does it may be stuck.
+    if (live().guard.try_lock_for(std::chrono::milliseconds(700)))
         for (const Temporary* t : live().temporaries)
-            t->discard();
+            t->discard(); // the lock stays: nothing more is published
+}
+
+Publishing::Publishing() {
+    live().guard.lock();
+}
+
+Publishing::~Publishing() {
+    live().guard.unlock();
 }
 
 bool is_temporary(const std::string& name) {
