@@ -29,7 +29,7 @@ words() {
     fit)
       local family=gamma
       [ "$2" = now ] && family=weibull
-      words=(fit "$data/measurements/rock1.csv" --family "$family" -o law.json --report law.html) ;;
+      words=(fit "$data/measurements/rock1.csv" --family "$family" --resamples 19 -o law.json --report law.html) ;;
   esac
   words=(taihu "${words[@]}" -q)
 }
