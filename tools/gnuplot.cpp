@@ -69,6 +69,7 @@ int wait_for(pid_t child, const Progress* progress) {
         if (ended == 0)
             ::nanosleep(&kNap, nullptr);
     }
+    check_cancelled(progress); // Ctrl-C ends it as well as it asks us
     return WIFEXITED(status) ? WEXITSTATUS(status) : 1;
 }
 

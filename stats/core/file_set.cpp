@@ -23,11 +23,15 @@ bool is_folder(const fs::path& path) {
     return fs::is_directory(path, ignored);
 }
 
-/// The nearest folder above that there is.
+/// The nearest folder above that there is. \throws Error io: what is there is none.
 fs::path folder_above(const fs::path& path) {
+    std::error_code ignored;
     fs::path above = folder_of(path);
-    while (!is_folder(above) && above != folder_of(above))
+    while (!fs::exists(above, ignored) && above != folder_of(above))
         above = folder_of(above);
+    if (!is_folder(above))
+        throw Error(Fault::io,
+                    path.string() + ": " + above.string() + " is no folder; choose another name");
     return above;
 }
 

@@ -5,7 +5,7 @@ set -m # or a shell's background programs would not hear Ctrl-C; see also start(
 PATH=$(realpath "$1"):$PATH
 data=$(realpath "$(dirname "${BASH_SOURCE[0]}")/../../data")
 work=$(mktemp -d)
-trap 'umount "$work/disk" 2>/dev/null; rm -rf "$work"' EXIT
+trap 'umount "$work/disk" 2>/dev/null || true; rm -rf "$work"' EXIT
 RANDOM=${TAIHU_SEED:-1}
 wrong=0
 jobs=(carve split maps tiles fit)

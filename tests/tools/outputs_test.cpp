@@ -29,12 +29,12 @@ double seconds_of(const std::function<void()>& work) {
 TEST(Outputs, AFolderOfMapsEndsWithTheListOfThem) {
     const Scratch folder;
     must("taihu shape sphere --dim 24 -o ball.vdb", folder);
-    must("taihu bake ball.vdb --levels 1 --size 128 --maps new/maps --report r.json -o b.glb -q",
+    must("taihu bake ball.vdb --levels 1 --size 128 --maps maps --report r.json -o b.glb -q",
          folder);
-    const json list = json::parse(read_file(folder / "new/maps/files.json"));
-    EXPECT_EQ(list["files"].size() + 1, std::size_t(n_entries(folder / "new/maps")));
+    const json list = json::parse(read_file(folder / "maps/files.json"));
+    EXPECT_EQ(list["files"].size() + 1, std::size_t(n_entries(folder / "maps")));
     for (const json& file : list["files"]) {
-        const std::string bytes = read_file(folder / "new/maps" / file["file"].get<std::string>());
+        const std::string bytes = read_file(folder / "maps" / file["file"].get<std::string>());
         EXPECT_EQ(file["bytes"], bytes.size());
         EXPECT_EQ(file["sha256"], sha256_hex(bytes));
     }
@@ -79,7 +79,9 @@ TEST(Outputs, NoDeviceIsReplaced) {
     EXPECT_TRUE(fs::is_symlink(folder / "x.ply"));
 }
 
-TEST(Stopping, EndsAProgramThatIsWaitedFor) {
+class Stopping : public testing::TestWithParam<const char*> {};
+
+TEST_P(Stopping, EndsAProgramThatIsWaitedFor) {
     const Scratch folder;
     must("mkdir bin && printf '#!/bin/sh\\nexec sleep 60\\n' >bin/gnuplot && chmod +x bin/gnuplot",
          folder);
@@ -98,7 +100,10 @@ TEST(Stopping, EndsAProgramThatIsWaitedFor) {
     EXPECT_EQ(n_entries(folder.path()), 1);
 }
 
-TEST(Stopping, EndsWorkThatDoesNotLookUp) {
+// The signal goes to both, as from a terminal, or to taihu alone.
+INSTANTIATE_TEST_SUITE_P(Signal, Stopping, testing::Values("", "--foreground"));
+
+TEST(Backstop, EndsWorkThatDoesNotLookUp) {
     const Scratch folder;
     Finished said;
     // 1.3 million triangles are looked at for crossings without a look at signals.
