@@ -45,9 +45,13 @@ public:
         device_ = rtcNewDevice("verbose=0");
         scene_ = device_ ? rtcNewScene(device_) : nullptr;
         if (!scene_) {
+            const RTCError why = rtcGetDeviceError(device_);
             release();
             throw Error(Fault::unsupported,
-                        "render: embree does not start on this machine; it needs SSE2 or better");
+                        why == RTC_ERROR_UNSUPPORTED_CPU
+                            ? "render: embree does not start on this machine; it needs SSE2 or "
+                              "better"
+                            : "render: embree does not start; free memory or use fewer threads");
         }
         rtcSetSceneFlags(scene_,
                          static_cast<RTCSceneFlags>(RTC_SCENE_FLAG_ROBUST |

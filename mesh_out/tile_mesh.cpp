@@ -3,9 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cstring>
-#include <fstream>
 #include <limits>
-#include <system_error>
 #include <unordered_map>
 #include <unordered_set>
 #include <utility>
@@ -26,21 +24,10 @@ using openvdb::Coord;
 using openvdb::CoordBBox;
 using Leaf = openvdb::FloatTree::LeafNodeType;
 
-/// A file that is written piece by piece, under a name of its own until it is whole.
+/// A file that is written in small pieces.
 class Pieces {
 public:
-    explicit Pieces(const fs::path& path)
-        : path_(path),
-          out_(path, std::ios::binary | std::ios::trunc | std::ios::in | std::ios::out) {
-        check();
-    }
-    Pieces(const Pieces&) = delete;
-    Pieces& operator=(const Pieces&) = delete;
-    ~Pieces() {
-        out_.close();
-        std::error_code ignored;
-        fs::remove(path_, ignored); // no longer there once it was renamed
-    }
+    explicit Pieces(const fs::path& path) : file_(path) {}
     template <class T>
     void add(const T& value) {
         const auto* bytes = reinterpret_cast<const char*>(&value);
@@ -54,47 +41,31 @@ public:
     void append(Pieces& other) {
         other.flush();
         flush();
-        other.out_.seekg(0);
         std::vector<char> part(kMost);
-        while (other.out_.read(part.data(), static_cast<std::streamsize>(part.size())),
-               other.out_.gcount() > 0)
-            out_.write(part.data(), other.out_.gcount());
-        check();
+        std::uint64_t at = 0;
+        while (const std::size_t n = other.file_.read_at(at, part)) {
+            file_.write({part.data(), n});
+            at += n;
+        }
     }
     void replace_start(const std::string& text) {
         flush();
-        out_.seekp(0);
-        out_.write(text.data(), static_cast<std::streamsize>(text.size()));
-        check();
+        file_.write_at(0, text);
     }
-    std::uint64_t finish(const fs::path& name) {
+    std::uint64_t publish() {
         flush();
-        out_.close();
-        check();
-        std::error_code error;
-        const auto n = fs::file_size(path_, error);
-        fs::rename(path_, name, error);
-        if (error)
-            throw Error(Fault::io, name.string() + ": " + error.message());
-        return n;
+        file_.publish();
+        return file_.size();
     }
 
 private:
     static constexpr std::size_t kMost = std::size_t{1} << 20;
     void flush() {
-        out_.write(buffer_.data(), static_cast<std::streamsize>(buffer_.size()));
-        out_.flush();
+        file_.write({buffer_.data(), buffer_.size()});
         buffer_.clear();
-        check();
-    }
-    void check() const {
-        if (!out_)
-            throw Error(Fault::io, path_.string() +
-                                       ": cannot be written; check the folder and its free space");
     }
 
-    fs::path path_;
-    std::fstream out_;
+    OutputFile file_;
     std::vector<char> buffer_;
 };
 
@@ -125,8 +96,7 @@ struct PositionHash {
 /// Tiles as one mesh: what they share is kept until no more of them can have it.
 class Welder {
 public:
-    Welder(const fs::path& out)
-        : vertices_(out.string() + ".tmp"), faces_(out.string() + ".faces.tmp") {
+    explicit Welder(const fs::path& out) : vertices_(out), faces_(out) {
         vertices_.add_text(header(0, 0));
     }
 
@@ -135,7 +105,7 @@ public:
     void forget_before(double x) {
         std::erase_if(shared_, [x](const auto& v) { return double(v.first[0]) < x; });
     }
-    TileMeshResult finish(const fs::path& out);
+    TileMeshResult finish();
 
 private:
     struct Shared {
@@ -148,7 +118,7 @@ private:
     void measure(const TileSurface& tile, const std::vector<Vec3>& positions);
     void count_fans(const TileSurface& tile, const std::vector<std::uint8_t>& is_new);
 
-    Pieces vertices_, faces_;
+    Pieces vertices_, faces_; ///< the second ends in the first
     std::unordered_map<Position, Shared, PositionHash> shared_;
     std::unordered_set<std::uint64_t> open_; ///< directed edges whose other face is still to come
     std::uint32_t n_pieces_ = 0;             ///< seen in single tiles
@@ -302,7 +272,7 @@ void Welder::count_fans(const TileSurface& tile, const std::vector<std::uint8_t>
     }
 }
 
-TileMeshResult Welder::finish(const fs::path& out) {
+TileMeshResult Welder::finish() {
     result_.n_boundary_edges += open_.size();
     result_.n_self_intersections = crossings_twice_ / 2;
     Partition pieces(n_pieces_);
@@ -315,7 +285,7 @@ TileMeshResult Welder::finish(const fs::path& out) {
     result_.genus = static_cast<std::int64_t>(result_.n_components) - euler / 2;
     vertices_.append(faces_);
     vertices_.replace_start(header(result_.n_vertices, result_.n_triangles));
-    result_.n_bytes = vertices_.finish(out);
+    result_.n_bytes = vertices_.publish();
     return result_;
 }
 
@@ -459,7 +429,7 @@ TileMeshResult write_tile_mesh(const fs::path& set, const fs::path& out,
                                  lattice.voxel_m * (boxes[i].min().x() - kReach_vox));
         add_box(parts, boxes[i], settings, welder, progress);
     }
-    TileMeshResult result = welder.finish(out);
+    TileMeshResult result = welder.finish();
     result.n_tiles = parts.set().tiles.size();
     return result;
 }

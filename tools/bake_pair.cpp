@@ -110,6 +110,9 @@ void tell(const std::string& where, const BakedLevel& baked, const Certificate& 
 } // namespace
 
 nlohmann::ordered_json write_baked_pair(const BakePair& pair, const Console& console) {
+    std::optional<FileSet> masters;
+    if (!pair.files.maps.empty())
+        masters.emplace(pair.files.maps);
     High high = read_high(pair.high, console);
     const auto [low, grid] = read_low(pair, console);
     const Measure measure = high.measure;
@@ -155,15 +158,10 @@ nlohmann::ordered_json write_baked_pair(const BakePair& pair, const Console& con
     if (pair.at_foot)
         glb.shift = foot_shift(certificate.box);
     const std::string bytes = format_glb(std::span(&baked.encoded, 1), glb);
-    check_cancelled(console.progress);
-    if (!pair.files.maps.empty()) {
-        StagedFolder masters(pair.files.maps);
-        write_maps(masters.staging(), "level0", baked.maps);
-        masters.publish();
-    }
-    write_file(pair.files.out, bytes);
-    if (!pair.files.report.empty())
-        write_file(pair.files.report, report.dump(2) + "\n");
+    if (masters)
+        masters->add_by(
+            [&](const std::filesystem::path& folder) { write_maps(folder, "level0", baked.maps); });
+    write_together(pair.files, masters, bytes, report, console);
     return report;
 }
 

@@ -1,10 +1,7 @@
 #include "tools/baked_files.h"
 
 #include <algorithm>
-#include <system_error>
 #include <vector>
-
-#include <stdlib.h>
 
 #include "mesh_out/io/mesh_file.h"
 #include "mesh_out/lod.h"
@@ -51,7 +48,7 @@ struct Baker {
     const BakeSource& source;
     const RecipeLod& lod;
     double voxel_m;
-    std::optional<StagedFolder>& masters;
+    std::optional<FileSet>& masters;
     const Console& console;
 
     /// Far enough to reach what a level lost, and not the next wall.
@@ -89,7 +86,9 @@ struct Baker {
                 report["levels"][j]["bytes"] = baked.encoded.draco.size();
                 report["levels"][j]["maps"] = maps_json(baked);
                 if (masters)
-                    write_maps(masters->staging(), fmt::format("level{}", j), baked.maps);
+                    masters->add_by([&](const fs::path& folder) {
+                        write_maps(folder, fmt::format("level{}", j), baked.maps);
+                    });
                 levels.back() = std::move(baked.encoded);
             }
             levels.back().screen_coverage = coverages[j];
@@ -118,25 +117,18 @@ void BakedFiles::check(std::initializer_list<fs::path> inputs, const Console& co
         console.may_write(maps / fmt::format("level{}_normal.exr", j));
 }
 
-StagedFolder::StagedFolder(fs::path folder)
-    : folder_(std::move(folder)), made_(fs::create_directories(folder_)) {
-    std::string name = (folder_ / ".taihu-tmp-XXXXXX").string();
-    if (!::mkdtemp(name.data()))
-        throw Error(Fault::io, folder_.string() + ": cannot make a folder in it; check its rights "
-                                                  "and the space left");
-    staging_ = name;
-}
-
-StagedFolder::~StagedFolder() {
-    std::error_code ignored;
-    fs::remove_all(staging_, ignored);
-    if (made_)
-        fs::remove(folder_, ignored); // where it is empty
-}
-
-void StagedFolder::publish() {
-    for (const auto& entry : fs::directory_iterator(staging_))
-        fs::rename(entry.path(), folder_ / entry.path().filename());
+void write_together(const BakedFiles& files, std::optional<FileSet>& maps, std::string_view glb,
+                    const nlohmann::ordered_json& report, const Console& console) {
+    OutputFiles outputs;
+    outputs.add(files.out, glb);
+    outputs.add(files.report, report.dump(2) + "\n");
+    if (maps)
+        maps->list();
+    const Publishing together;
+    check_cancelled(console.progress);
+    if (maps)
+        maps->publish(kFileListName);
+    outputs.publish();
 }
 
 nlohmann::ordered_json maps_json(const BakedLevel& baked) {
@@ -158,6 +150,9 @@ nlohmann::ordered_json write_baked(const BakedFiles& files, openvdb::FloatGrid::
                                    std::shared_ptr<const Field> field, const RecipeLod& lod,
                                    const std::string& recipe, const Console& console) {
     const double voxel_m = lattice_of(*grid).voxel_m;
+    std::optional<FileSet> masters;
+    if (!files.maps.empty())
+        masters.emplace(files.maps);
     const LodChain chain = make_chain(*grid, field.get(), lod, console);
     if (!field)
         field = std::make_shared<PlacedLevelSetField>(grid);
@@ -166,9 +161,6 @@ nlohmann::ordered_json write_baked(const BakedFiles& files, openvdb::FloatGrid::
         reach_m = std::max(reach_m, Baker::reach_m(level, lod, voxel_m));
     const BakeSource source =
         bake_source(*grid, *field, reach_m, lod.openness ? lod.maps->n_rays : 0, console.progress);
-    std::optional<StagedFolder> masters;
-    if (!files.maps.empty())
-        masters.emplace(files.maps);
     auto report = nlohmann::ordered_json::parse(format_report(chain, base_name(files.out)));
     const auto levels =
         Baker{files.out, chain, source, lod, voxel_m, masters, console}.bake_all(report);
@@ -176,15 +168,10 @@ nlohmann::ordered_json write_baked(const BakedFiles& files, openvdb::FloatGrid::
     if (lod.at_foot)
         glb.shift = foot_shift(chain.levels.front().certificate.box);
     const std::string bytes = format_glb(levels, glb);
-    check_cancelled(console.progress);
-    if (masters)
-        masters->publish();
-    write_file(files.out, bytes);
+    write_together(files, masters, bytes, report, console);
     console.say("{}: {} levels, {} bytes", files.out.string(), levels.size(), bytes.size());
     if (!chain.note.empty())
         console.say("{}: {}", files.out.string(), chain.note);
-    if (!files.report.empty())
-        write_file(files.report, report.dump(2) + "\n");
     return report;
 }
 

@@ -1,9 +1,12 @@
 #pragma once
 #include <filesystem>
 #include <memory>
+#include <optional>
 #include <string>
+#include <string_view>
 
 #include "mesh_out/bake_level.h"
+#include "stats/core/file_set.h"
 #include "tools/console.h"
 #include "vdb_ops/field.h"
 #include "vdb_ops/recipe.h"
@@ -18,21 +21,10 @@ struct BakedFiles {
     void check(std::initializer_list<std::filesystem::path> inputs, const Console& console) const;
 };
 
-/// Files that appear in their folder together, or not at all: until publish() they are in a folder
-/// of their own in it, which goes with this. A folder that was made for them goes, too.
-class StagedFolder {
-public:
-    explicit StagedFolder(std::filesystem::path folder);
-    ~StagedFolder();
-    StagedFolder(const StagedFolder&) = delete;
-    StagedFolder& operator=(const StagedFolder&) = delete;
-    const std::filesystem::path& staging() const { return staging_; }
-    void publish();
-
-private:
-    std::filesystem::path folder_, staging_;
-    bool made_;
-};
+/// Writes a GLB, the maps that are written so far, and the figures: none comes into view before all
+/// are whole, and none when it is cancelled.
+void write_together(const BakedFiles& files, std::optional<FileSet>& maps, std::string_view glb,
+                    const nlohmann::ordered_json& report, const Console& console);
 
 /// The side of maps where none is asked for, and how far it grows where normals want it.
 inline constexpr int kSide_px = 2048, kMostSide_px = 4096;

@@ -2,9 +2,13 @@
 
 #include <csignal>
 #include <cstdio>
+#include <ctime>
+#include <pthread.h>
+#include <semaphore.h>
 #include <unistd.h>
 
 #include "stats/core/error.h"
+#include "stats/core/file.h"
 #include "stats/core/text.h"
 #include "vdb_ops/tiles.h"
 
@@ -13,9 +17,41 @@ namespace {
 
 std::atomic<int> g_signal{0};
 static_assert(std::atomic<int>::is_always_lock_free); // so a handler may write it
+sem_t g_asked;
+std::atomic_flag g_ending;
 
 void on_signal(int signal) {
     g_signal = signal;
+    ::sem_post(&g_asked);
+}
+
+/// Ends the program where the work does not by itself: not all that a library does can be asked to
+/// stop. Files come into view by renames alone, so nothing is torn.
+void* end_soon(void*) {
+    constexpr timespec kPatience{.tv_sec = 1, .tv_nsec = 0};
+    while (::sem_wait(&g_asked) != 0)
+        ;
+    ::nanosleep(&kPatience, nullptr);
+    claim_the_end();
+    discard_temporaries();
+    std::fprintf(stderr, "%staihu: %s\n", ::isatty(STDERR_FILENO) ? "\r\033[K" : "", kStopped);
+    ::_exit(128 + g_signal);
+}
+
+/// A small thread: one that cannot be had is missed by nobody who waits.
+void start_backstop() {
+    pthread_attr_t small;
+    pthread_t thread;
+    sigset_t all, before;
+    ::sem_init(&g_asked, 0, 0);
+    sigfillset(&all);
+    ::pthread_sigmask(SIG_SETMASK, &all, &before); // signals go to the threads that work
+    ::pthread_attr_init(&small);
+    ::pthread_attr_setdetachstate(&small, PTHREAD_CREATE_DETACHED);
+    ::pthread_attr_setstacksize(&small, std::size_t{256} << 10);
+    ::pthread_create(&thread, &small, end_soon, nullptr);
+    ::pthread_attr_destroy(&small);
+    ::pthread_sigmask(SIG_SETMASK, &before, nullptr);
 }
 
 } // namespace
@@ -24,7 +60,15 @@ int stop_signal() {
     return g_signal;
 }
 
+void claim_the_end() {
+    if (g_ending.test_and_set()) {
+        ::sleep(3); // by then the other has ended it, unless it fails in doing so
+        ::_exit(70);
+    }
+}
+
 void catch_stop_signals() {
+    start_backstop();
     struct sigaction action {};
     action.sa_handler = on_signal;
     action.sa_flags = static_cast<int>(SA_RESETHAND); // a second Ctrl-C kills

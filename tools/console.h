@@ -81,8 +81,11 @@ inline constexpr int kSaysNo = 3;
 
 /// The signal that asked to stop, or 0.
 int stop_signal();
-/// Let SIGINT and SIGTERM cancel instead of kill.
+/// Let SIGINT and SIGTERM cancel instead of kill; what has not ended a second later is ended.
 void catch_stop_signals();
+inline constexpr const char* kStopped = "stopped; no output was written";
+/// Of threads that end the program the first goes on; others wait for the end here.
+void claim_the_end();
 
 // One function a verb, each in the file of its name.
 void add_bake(CLI::App& app, Console& console);

@@ -1,12 +1,15 @@
 // taihu fit: measured profiles as a law of hole diameters.
 #include "stats/fit.h"
 
+#include <algorithm>
+#include <tuple>
+
 #include "mesh_out/certificate.h"
 #include "mesh_out/extract.h"
 #include "stats/bootstrap.h"
 #include "stats/chi_squared.h"
 #include "stats/core/error.h"
-#include "stats/core/file.h"
+#include "stats/core/file_set.h"
 #include "stats/core/text.h"
 #include "stats/expect.h"
 #include "stats/io/law_file.h"
@@ -34,6 +37,14 @@ struct FitArgs {
     AssessSettings assess;
 };
 
+/// By name: the law does not depend on the order in which files were given.
+std::vector<SourceFile> sorted(std::vector<SourceFile> sources) {
+    std::sort(sources.begin(), sources.end(), [](const SourceFile& a, const SourceFile& b) {
+        return std::tie(a.name, a.sha256) < std::tie(b.name, b.sha256);
+    });
+    return sources;
+}
+
 /// The tables of the thesis, from binned counts; its F3 is a law to draw from, if asked for.
 void run_thesis(const FitArgs& args, const Measurements& measurements, const Console& console) {
     if (measurements.sample.bins.empty())
@@ -47,7 +58,7 @@ void run_thesis(const FitArgs& args, const Measurements& measurements, const Con
         file.law = empirical_law(inversion);
         file.unit = measurements.sample.unit;
         file.n_profiles = n_profiles(measurements.sample);
-        file.source = measurements.sources;
+        file.source = sorted(measurements.sources);
         write_file(args.out, format_law_file(file));
         console.say("{}: the thesis' F3 as a law to draw from", args.out.string());
     }
@@ -238,7 +249,7 @@ std::string format_report(const FitArgs& args, const Measurements& measurements,
                                .seed = args.assess.seed,
                                .resolution = args.fit.resolution},
                               console.progress);
-    return format_report_html({measurements, ranking, assessment, band, photos});
+    return format_report_html({measurements, ranking, assessment, band, photos, console.progress});
 }
 
 /// Whether the sample obeys the law of a file. Returns the keys of the JSON result.
@@ -323,19 +334,22 @@ void run(FitArgs& args, const Console& console) {
     LawFile file = make_law_file(ranking, measurements);
     if (photos)
         file.empirical.assign(photos->points().begin(), photos->points().end());
+    file.source = sorted(file.source);
     const std::string law = format_law_file(file);
     tell(ranking, sample, console);
     for (const std::string& finding : assessment.findings)
         console.say_text(finding);
-    if (!args.report.empty()) {
-        write_file(args.report,
-                   format_report(args, measurements, ranking, assessment, photos, console));
+    OutputFiles outputs;
+    if (!args.report.empty())
+        outputs.add(args.report,
+                    format_report(args, measurements, ranking, assessment, photos, console));
+    outputs.add(args.out, law);
+    check_cancelled(console.progress);
+    outputs.publish();
+    if (!args.report.empty())
         console.say("{}: the report", args.report.string());
-    }
-    if (!args.out.empty()) {
-        write_file(args.out, law);
+    if (!args.out.empty())
         console.say("{}: the law", args.out.string());
-    }
     auto json = nlohmann::ordered_json::parse(law);
     if (!asked)
         return console.result(json);

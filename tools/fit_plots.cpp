@@ -96,8 +96,8 @@ double greatest_profile(const Sample& sample) {
         ->hi;
 }
 
-std::string plot_sections(const Sample& sample, const LawRanking& ranking,
-                          const DisplayUnit& unit) {
+std::string plot_sections(const Sample& sample, const LawRanking& ranking, const DisplayUnit& unit,
+                          const Progress* progress) {
     const double end = 1.15 * greatest_profile(sample);
     const auto n = static_cast<double>(n_profiles(sample));
     const std::size_t n_laws = std::min<std::size_t>(ranking.fits.size(), kMostLaws);
@@ -119,11 +119,11 @@ std::string plot_sections(const Sample& sample, const LawRanking& ranking,
     script += "e\n";
     for (std::size_t i = n_laws; i-- > 0;)
         script += density_curve(sample, ranking.fits[i].law, end, unit);
-    return gnuplot_svg("sections", script);
+    return gnuplot_svg("sections", script, progress);
 }
 
 std::string plot_holes(const Fit& fit, const Band& band, const std::optional<Law>& photos,
-                       const DisplayUnit& unit) {
+                       const DisplayUnit& unit, const Progress* progress) {
     std::string script = kLook;
     script += fmt::format("set key bottom right\nset xlabel 'diameter of the hole [{}]'\n"
                           "set ylabel 'share of the holes'\nset xrange [0:{:.6g}]\n"
@@ -151,11 +151,11 @@ std::string plot_holes(const Fit& fit, const Band& band, const std::optional<Law
                                   below + (1 - below) * p.cdf);
         script += "e\n";
     }
-    return gnuplot_svg("holes", script);
+    return gnuplot_svg("holes", script, progress);
 }
 
 std::string plot_places(const Measurements& measurements, const PhotoLocation& at,
-                        const DisplayUnit& unit) {
+                        const DisplayUnit& unit, const Progress* progress) {
     const Photo& photo = measurements.photos[at.photo];
     const Window& window = *photo.window;
     const double f = unit.factor, step = window.height() / kMaskRows;
@@ -188,7 +188,7 @@ std::string plot_places(const Measurements& measurements, const PhotoLocation& a
                 fmt::format("{:.6g} {:.6g} {:.6g}\n", 0.5 * (s.x1 + s.x2) * photo.unit_per_px * f,
                             0.5 * (s.y1 + s.y2) * photo.unit_per_px * f, 0.5 * s.diameter * f);
     script += "e\n";
-    return gnuplot_svg("places" + std::to_string(at.photo), script);
+    return gnuplot_svg("places" + std::to_string(at.photo), script, progress);
 }
 
 } // namespace taihu

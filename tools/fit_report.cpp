@@ -127,11 +127,11 @@ std::string figure(const std::string& svg, const std::string& caption) {
 
 std::string sizes(const FitReport& r, const DisplayUnit& unit) {
     return "<h2>Sizes</h2>\n" +
-           figure(plot_sections(r.measurements.sample, r.ranking, unit),
+           figure(plot_sections(r.measurements.sample, r.ranking, unit, r.progress),
                   "What you measured (bars) are sections: a cut seldom goes through the middle of "
                   "a hole, so most look smaller than they are. The line is what holes of the "
                   "law would show; it should follow the bars.") +
-           figure(plot_holes(r.ranking.fits.front(), r.band, r.photos, unit),
+           figure(plot_holes(r.ranking.fits.front(), r.band, r.photos, unit, r.progress),
                   "The holes themselves: the share of them that is at most so large. The band "
                   "shows how well this is known from so many sections; the thin line is what the "
                   "photos say with no law assumed. Left of the dashed line nothing was marked: "
@@ -174,7 +174,7 @@ std::string places(const FitReport& r, const DisplayUnit& unit) {
     for (const PhotoLocation& at : r.assessment.locations) {
         if (text.size() > 2'000'000) // a page that a browser still opens
             break;
-        text += figure(plot_places(r.measurements, at, unit),
+        text += figure(plot_places(r.measurements, at, unit, r.progress),
                        html(r.measurements.photos[at.photo].name) + ": " +
                            counted(at.points.size(), "hole") +
                            ", each as large as it was marked; grey is what was searched.");

@@ -18,10 +18,11 @@ struct FitReport {
     const Assessment& assessment;
     const Band& band;                 ///< of the law's F3
     const std::optional<Law>& photos; ///< F3 above the limit with no family assumed
+    const Progress* progress = nullptr;
 };
 
 /// One self-contained page for people who are no statisticians.
-/// \throws Error unsupported: no gnuplot to draw its plots.
+/// \throws Error as gnuplot_svg().
 std::string format_report_html(const FitReport& report);
 
 /// The same figures for programs.

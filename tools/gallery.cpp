@@ -3,11 +3,9 @@
 #include <chrono>
 #include <set>
 
-#include <unistd.h>
-
 #include "mesh_out/io/image_file.h"
 #include "stats/core/error.h"
-#include "stats/core/file.h"
+#include "stats/core/file_set.h"
 #include "stats/core/text.h"
 #include "tools/gallery_manifest.h"
 #include "tools/gallery_page.h"
@@ -63,30 +61,6 @@ void list_rows(const std::vector<GalleryText>& texts, const Console& console) {
     console.result({{"rows", json}});
 }
 
-/// A new folder beside the one to be: gone again with all that is in it unless it was published.
-class WorkFolder {
-public:
-    explicit WorkFolder(const fs::path& beside) {
-        std::string name = fs::absolute(beside).string() + ".XXXXXX";
-        if (!::mkdtemp(name.data()))
-            throw Error(Fault::io, beside.string() + ": no folder can be made beside it; choose "
-                                                     "another place");
-        path_ = name;
-        fs::permissions(path_, fs::perms(0755)); // mkdtemp's are for its owner alone
-    }
-    ~WorkFolder() {
-        std::error_code ignored;
-        fs::remove_all(path_, ignored);
-    }
-    WorkFolder(const WorkFolder&) = delete;
-    WorkFolder& operator=(const WorkFolder&) = delete;
-
-    const fs::path& path() const { return path_; }
-
-private:
-    fs::path path_;
-};
-
 /// Commands name files of their own folder; the one before is the current one again afterwards.
 class CurrentFolder {
 public:
@@ -117,11 +91,7 @@ void check_output(const fs::path& out, const Console& console) {
     if (!out.has_filename())
         throw Error(Fault::bad_argument, "-o: '" + printable(out.string()) +
                                              "' ends with a slash; name the folder without it");
-    if (out.has_parent_path())
-        fs::create_directories(out.parent_path(), failed);
-    if (failed)
-        throw Error(Fault::io, out.string() + ": " + failed.message() + "; choose another");
-    if (!fs::exists(out))
+    if (!fs::exists(out, failed))
         return;
     if (!fs::is_directory(out))
         throw Error(Fault::io, out.string() + ": is a file; name a folder");
@@ -178,28 +148,12 @@ MadeEntry make_entry(const GalleryEntry& entry, const fs::path& gallery, Progres
     return made;
 }
 
-/// All of it takes the place of an earlier gallery in two renames.
-void publish(const WorkFolder& work, const fs::path& out) {
-    std::error_code failed;
-    const WorkFolder old(out); // takes the earlier one away
-    if (fs::exists(out))
-        fs::rename(out, old.path() / "old", failed);
-    if (!failed)
-        fs::rename(work.path(), out, failed);
-    if (failed) {
-        std::error_code ignored;
-        if (!fs::exists(out))
-            fs::rename(old.path() / "old", out, ignored);
-        throw Error(Fault::io, out.string() + ": " + failed.message() + "; choose another folder");
-    }
-}
-
 void run(const GalleryArgs& args, const Console& console) {
     const std::vector<GalleryText> texts = chosen_texts(args.only);
     if (args.list)
         return list_rows(texts, console);
     check_output(args.out, console);
-    const WorkFolder work(args.out);
+    WorkFolder work(args.out);
     std::size_t n_entries = 0, n_pictures = 0;
     std::vector<MadeText> made;
     for (const GalleryText& text : texts) {
@@ -221,7 +175,7 @@ void run(const GalleryArgs& args, const Console& console) {
     }
     write_file(work.path() / kPage, format_gallery(made));
     check_cancelled(console.progress);
-    publish(work, args.out);
+    work.publish();
     const fs::path page = args.out / kPage;
     console.say("{}: {} rows, {} pictures", page.string(), n_entries, n_pictures);
     console.result({{"file", page.string()}, {"rows", n_entries}, {"pictures", n_pictures}});

@@ -1,10 +1,14 @@
 #include "tools/gnuplot.h"
 
+#include <algorithm>
 #include <array>
 #include <cerrno>
+#include <csignal>
 #include <cstdlib>
 #include <cstring>
+#include <ctime>
 #include <spawn.h>
+#include <string_view>
 #include <sys/mman.h>
 #include <sys/wait.h>
 #include <unistd.h>
@@ -20,11 +24,18 @@ class MemoryFile {
 public:
     explicit MemoryFile(const std::string& content = "")
         : fd_(::memfd_create("taihu", MFD_CLOEXEC)) {
-        if (fd_ < 0 ||
-            ::write(fd_, content.data(), content.size()) != static_cast<ssize_t>(content.size()) ||
-            ::lseek(fd_, 0, SEEK_SET) != 0)
-            throw Error(Fault::io, "report: " + std::string(std::strerror(errno)) +
-                                       " for a plot; close other programs");
+        std::string_view left = content;
+        ssize_t n = fd_ < 0 ? -1 : 0;
+        while (n >= 0 && !left.empty()) {
+            n = ::write(fd_, left.data(), left.size());
+            left.remove_prefix(static_cast<std::size_t>(std::max<ssize_t>(n, 0)));
+        }
+        if (n < 0 || ::lseek(fd_, 0, SEEK_SET) != 0) {
+            const int code = errno;
+            ::close(fd_);
+            throw Error(Fault::io, "report: " + std::string(std::strerror(code)) +
+                                       " for a plot; close other programs and raise limits");
+        }
     }
     ~MemoryFile() { ::close(fd_); }
     MemoryFile(const MemoryFile&) = delete;
@@ -44,8 +55,27 @@ private:
     int fd_;
 };
 
+/// Exit status of a program that was started; it is killed when the work is cancelled.
+int wait_for(pid_t child, const Progress* progress) {
+    constexpr timespec kNap{.tv_sec = 0, .tv_nsec = 2'000'000};
+    int status = 0;
+    for (pid_t ended = 0; ended == 0;) {
+        ended = ::waitpid(child, &status, WNOHANG);
+        if (ended == 0 && progress && progress->cancelled()) {
+            ::kill(child, SIGKILL);
+            ::waitpid(child, &status, 0);
+            check_cancelled(progress);
+        }
+        if (ended == 0)
+            ::nanosleep(&kNap, nullptr);
+    }
+    check_cancelled(progress); // Ctrl-C ends it as well as it asks us
+    return WIFEXITED(status) ? WEXITSTATUS(status) : 1;
+}
+
 /// Exit status of gnuplot, or -1 when it cannot be started.
-int run_gnuplot(const MemoryFile& in, const MemoryFile& out, const MemoryFile& err) {
+int run_gnuplot(const MemoryFile& in, const MemoryFile& out, const MemoryFile& err,
+                const Progress* progress) {
     posix_spawn_file_actions_t files;
     posix_spawn_file_actions_init(&files);
     posix_spawn_file_actions_adddup2(&files, in.fd(), STDIN_FILENO);
@@ -62,27 +92,26 @@ int run_gnuplot(const MemoryFile& in, const MemoryFile& out, const MemoryFile& e
     const int failed = ::posix_spawnp(&child, words[0].c_str(), &files, nullptr, arguments.data(),
                                       environment.data());
     posix_spawn_file_actions_destroy(&files);
-    int status = 0;
-    if (failed != 0)
-        return -1;
-    while (::waitpid(child, &status, 0) < 0 && errno == EINTR)
-        ;
-    return WIFEXITED(status) ? WEXITSTATUS(status) : 1;
+    return failed != 0 ? -1 : wait_for(child, progress);
 }
 
 } // namespace
 
-std::string gnuplot_svg(const std::string& name, const std::string& script) {
+std::string gnuplot_svg(const std::string& name, const std::string& script,
+                        const Progress* progress) {
     const MemoryFile in("set terminal svg size 720,400 dynamic font 'sans-serif,13' name '" + name +
                         "' noenhanced\nset encoding utf8\n" + script);
     const MemoryFile out, err;
-    const int status = run_gnuplot(in, out, err);
+    const int status = run_gnuplot(in, out, err, progress);
     if (status < 0 || status == 127)
         throw Error(Fault::unsupported, "report: there is no gnuplot to draw its plots; install "
                                         "the Debian package gnuplot-nox");
     std::string svg = out.content();
+    if (status == 0 && svg.find("</svg>") == std::string::npos)
+        throw Error(Fault::io,
+                    "report: gnuplot's picture is cut off; raise the limit of file sizes");
     const std::size_t start = svg.find("<svg"); // without the XML declaration, which HTML has not
-    if (status != 0 || start == std::string::npos || svg.find("</svg>") == std::string::npos)
+    if (status != 0 || start == std::string::npos)
         throw Error(Fault::unsupported, "report: gnuplot says '" + printable(err.content(), 200) +
                                             "'; is it version 5.4 or later");
     svg.erase(0, start);

@@ -1,6 +1,8 @@
 #pragma once
 #include <string>
 
+#include "stats/core/progress.h"
+
 namespace taihu {
 
 /// What gnuplot draws: an SVG picture.
@@ -8,7 +10,8 @@ namespace taihu {
 ///                stand on one page.
 /// \param script  commands and data, after the terminal was set; it must not hold foreign text.
 /// \throws Error unsupported: there is no gnuplot, or it stumbles over the script; io: no memory
-///         for its files.
-std::string gnuplot_svg(const std::string& name, const std::string& script);
+///         for its files, or a limit of their size; cancelled: at once, gnuplot is ended.
+std::string gnuplot_svg(const std::string& name, const std::string& script,
+                        const Progress* progress = nullptr);
 
 } // namespace taihu

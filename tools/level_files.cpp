@@ -6,7 +6,7 @@
 #include "mesh_out/io/mesh_file.h"
 #include "mesh_out/lod.h"
 #include "stats/core/error.h"
-#include "stats/core/file.h"
+#include "stats/core/file_set.h"
 #include "stats/core/sha256.h"
 #include "tools/solid_files.h"
 
@@ -14,6 +14,7 @@ namespace taihu {
 namespace {
 
 constexpr double kScreenHeight_px = 1080;
+constexpr const char* kManifest = "manifest.json";
 
 template <class Number>
 void require_falling(const std::string& option, const std::vector<Number>& numbers) {
@@ -28,38 +29,51 @@ std::string level_name(std::size_t j) {
     return fmt::format("level{}.glb", j);
 }
 
-/// Where each level takes over: at the distance from which its error is below a pixel of a screen
-/// of 1080 lines.
-std::string format_manifest(const LodChain& chain, const std::vector<std::string>& files,
-                            double fov_deg) {
-    nlohmann::ordered_json json = {{"taihu_manifest", 1},
-                                   {"fov_deg", fov_deg},
-                                   {"screen_height_px", kScreenHeight_px},
-                                   {"levels", nlohmann::ordered_json::array()}};
-    const double pixels_per_m = // of something 1 m high, 1 m away
-        kScreenHeight_px / (2 * std::tan(fov_deg * std::numbers::pi / 360));
-    for (std::size_t j = 0; j < files.size(); ++j) {
-        const LodLevel& level = chain.levels[j];
-        json["levels"].push_back({{"file", level_name(j)},
-                                  {"sha256", sha256_hex(files[j])},
-                                  {"bytes", files[j].size()},
-                                  {"triangles", level.certificate.n_triangles},
-                                  {"bound_m", level.bound_m},
-                                  {"error_m", level.error_m},
-                                  {"from_m", j == 0 ? 0 : level.error_m * pixels_per_m}});
-    }
-    return json.dump(2) + "\n";
+nlohmann::ordered_json file_json(const std::string& name, const std::string& bytes) {
+    return {{"file", name}, {"sha256", sha256_hex(bytes)}, {"bytes", bytes.size()}};
 }
 
-void write_split(const LevelFiles& files, const LodChain& chain, const GlbSettings& settings) {
-    std::vector<std::string> glbs;
+/// Where each level takes over: at the distance from which its error is below a pixel of a screen
+/// of 1080 lines.
+nlohmann::ordered_json manifest_level(const LodChain& chain, std::size_t j, double fov_deg) {
+    const LodLevel& level = chain.levels[j];
+    const double pixels_per_m = // of something 1 m high, 1 m away
+        kScreenHeight_px / (2 * std::tan(fov_deg * std::numbers::pi / 360));
+    return {{"triangles", level.certificate.n_triangles},
+            {"bound_m", level.bound_m},
+            {"error_m", level.error_m},
+            {"from_m", j == 0 ? 0 : level.error_m * pixels_per_m}};
+}
+
+/// All in the folder, the manifest as the last; the report too, where that is its place.
+void write_split(const LevelFiles& files, const LodChain& chain, const GlbSettings& settings,
+                 const std::string& report, const Progress* progress) {
+    nlohmann::ordered_json manifest = {{"taihu_manifest", 1},
+                                       {"fov_deg", files.fov_deg},
+                                       {"screen_height_px", kScreenHeight_px},
+                                       {"levels", nlohmann::ordered_json::array()}};
+    FileSet set(files.out);
     for (std::size_t j = 0; j < chain.levels.size(); ++j) {
         EncodedLevel level = chain.levels[j].encoded;
         level.screen_coverage = 1;
-        glbs.push_back(format_glb(std::span(&level, 1), settings));
-        write_file(files.out / level_name(j), glbs.back());
+        const std::string glb = format_glb(std::span(&level, 1), settings);
+        set.add(level_name(j), glb);
+        manifest["levels"].push_back(file_json(level_name(j), glb));
+        manifest["levels"].back().update(manifest_level(chain, j, files.fov_deg));
     }
-    write_file(files.out / "manifest.json", format_manifest(chain, glbs, files.fov_deg));
+    OutputFiles apart;
+    if (files.report.parent_path() == files.out) {
+        const std::string name = files.report.filename().string();
+        set.add(name, report);
+        manifest["report"] = file_json(name, report);
+    } else {
+        apart.add(files.report, report);
+    }
+    set.add(kManifest, manifest.dump(2) + "\n");
+    const Publishing together;
+    check_cancelled(progress);
+    set.publish(kManifest);
+    apart.publish();
 }
 
 void tell(const LodChain& chain, const std::string& where, const Console& console) {
@@ -174,19 +188,19 @@ nlohmann::ordered_json write_levels(const LevelFiles& files, const openvdb::Floa
     GlbSettings glb{.recipe = recipe};
     if (lod.at_foot)
         glb.shift = foot_shift(chain.levels.front().certificate.box);
-    if (files.split) {
-        std::filesystem::create_directories(files.out);
-        write_split(files, chain, glb);
-    } else {
-        write_file(files.out, format_glb(chain, glb));
-    }
-    const std::string where = files.out.string();
-    tell(chain, where, console);
     const std::string report = format_report(chain, base_name(files.out));
-    if (!files.report.empty()) {
-        write_file(files.report, report);
-        console.say("{}: the figures of each level", files.report.string());
+    if (files.split) {
+        write_split(files, chain, glb, report, console.progress);
+    } else {
+        OutputFiles outputs;
+        outputs.add(files.out, format_glb(chain, glb));
+        outputs.add(files.report, report);
+        check_cancelled(console.progress);
+        outputs.publish();
     }
+    tell(chain, files.out.string(), console);
+    if (!files.report.empty())
+        console.say("{}: the figures of each level", files.report.string());
     return nlohmann::ordered_json::parse(report);
 }
 

@@ -1,13 +1,15 @@
 // The command `taihu`: verbs over files. Parses, calls, prints; the work is in the modules.
 #include <cstdio>
-#include <memory>
+#include <exception>
 #include <new>
 #include <optional>
+#include <system_error>
 #include <unistd.h>
 
 #include <openvdb/openvdb.h>
 
 #include "stats/core/error.h"
+#include "stats/core/file.h"
 #include "stats/core/text.h"
 #include "tools/console.h"
 #include "tools/verbs.h"
@@ -20,6 +22,33 @@ enum Exit { kDone = 0, kFailed = 1, kUsage = 2, kBug = 70, kSignalled = 128 };
 int fail(int code, const std::string& message) {
     std::fprintf(stderr, "taihu: %s\n", printable(message, 1000).c_str());
     return code;
+}
+
+/// What an exception that is none of ours means. Memory runs out, and threads cannot be started,
+/// anywhere: in OpenVDB, in TBB's own threads.
+int fail_foreign(const std::exception& e) {
+    const std::string what = e.what();
+    if (dynamic_cast<const std::bad_alloc*>(&e))
+        return fail(kFailed, "out of memory; use a larger voxel or fewer holes");
+    if (what.starts_with("pthread_create") || dynamic_cast<const std::system_error*>(&e))
+        return fail(kFailed,
+                    what + "; check paths and rights, free memory, or use fewer --threads");
+    return fail(kBug, "internal error: " + what + "; please report it");
+}
+
+/// For what is thrown where nobody can catch it, as in a thread of TBB that cannot start another.
+[[noreturn]] void on_terminate() {
+    claim_the_end();
+    int code = kBug;
+    try {
+        discard_temporaries();
+        std::rethrow_exception(std::current_exception());
+    } catch (const std::exception& e) {
+        code = fail_foreign(e);
+    } catch (...) {
+        fail(kBug, "internal error: an exception of unknown kind; please report it");
+    }
+    ::_exit(code);
 }
 
 const CLI::App* find_verb(const CLI::App& app, int argc, char** argv) {
@@ -105,15 +134,14 @@ int run(int argc, char** argv) {
         return usage_error(app, argc, argv, e);
     } catch (const Error& e) {
         progress.reset();
+        claim_the_end();
         if (e.fault() == Fault::cancelled && stop_signal() != 0)
-            return fail(kSignalled + stop_signal(), "stopped; no output was written");
+            return fail(kSignalled + stop_signal(), kStopped);
         return fail(e.fault() == Fault::bad_argument ? kUsage : kFailed, e.what());
-    } catch (const std::bad_alloc&) {
-        progress.reset();
-        return fail(kFailed, "out of memory; use a larger voxel or fewer holes");
     } catch (const std::exception& e) {
         progress.reset();
-        return fail(kBug, std::string("internal error: ") + e.what() + "; please report it");
+        claim_the_end();
+        return fail_foreign(e);
     }
     return kDone;
 }
@@ -122,5 +150,6 @@ int run(int argc, char** argv) {
 } // namespace taihu
 
 int main(int argc, char** argv) {
+    std::set_terminate(taihu::on_terminate);
     return taihu::run(argc, argv);
 }

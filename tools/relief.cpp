@@ -6,7 +6,7 @@
 #include "mesh_out/io/exr_file.h"
 #include "mesh_out/io/image_file.h"
 #include "stats/core/error.h"
-#include "stats/core/file.h"
+#include "stats/core/file_set.h"
 #include "stats/core/text.h"
 #include "stats/number_detail.h"
 #include "tools/console.h"
@@ -208,7 +208,8 @@ void scale_to(double departure_m, ReliefSettings& settings, ReliefTile& tile,
     tile = make_relief(settings, console.progress);
 }
 
-void write_tile(const ReliefArgs& args, const ReliefSettings& settings, const ReliefTile& tile) {
+void write_tile(const std::filesystem::path& path, const ReliefSettings& settings,
+                const ReliefTile& tile) {
     std::vector<const Image*> parts = {&tile.heights};
     ExrImage exr;
     exr.channels = {"Y"};
@@ -229,7 +230,7 @@ void write_tile(const ReliefArgs& args, const ReliefSettings& settings, const Re
                       {"Y_unit", "m"},
                       {"pixel_m", shortest(settings.pixel_m)},
                       {"wrap", settings.tileable ? "periodic" : "none"}};
-    write_exr(args.out, exr);
+    write_exr(path, exr);
 }
 
 nlohmann::ordered_json make_tile(const ReliefArgs& args, Plan plan, const Console& console) {
@@ -237,7 +238,22 @@ nlohmann::ordered_json make_tile(const ReliefArgs& args, Plan plan, const Consol
     if (plan.departure_m)
         scale_to(*plan.departure_m, plan.settings, tile, console);
     const ReliefSettings& s = plan.settings;
-    write_tile(args, s, tile);
+    FileSet output(args.out.parent_path()); // of one file, whatever else is in its folder
+    output.add_by([&](const std::filesystem::path& folder) {
+        write_tile(folder / args.out.filename(), s, tile);
+    });
+    std::optional<FileSet> preview;
+    if (!args.preview.empty()) {
+        preview.emplace(args.preview.parent_path());
+        preview->add_by([&](const std::filesystem::path& folder) {
+            write_image(folder / args.preview.filename(), relief_picture(tile, plan.material));
+        });
+    }
+    const Publishing together;
+    check_cancelled(console.progress);
+    output.publish(args.out.filename());
+    if (preview)
+        preview->publish(args.preview.filename());
     const auto [lo, hi] =
         std::minmax_element(tile.heights.pixels.begin(), tile.heights.pixels.end());
     const std::string where = args.out.string();
@@ -259,7 +275,6 @@ nlohmann::ordered_json make_tile(const ReliefArgs& args, Plan plan, const Consol
         json["roughness"] = json_of(fitted);
     }
     if (!args.preview.empty()) {
-        write_image(args.preview, relief_picture(tile, plan.material));
         console.say("{}: lit from the upper left", args.preview.string());
         json["preview"] = args.preview.string();
     }

@@ -8,6 +8,7 @@
 #include "mesh_out/io/image_file.h"
 #include "mesh_out/io/relief_file.h"
 #include "stats/core/error.h"
+#include "stats/core/file_set.h"
 #include "stats/core/text.h"
 #include "tools/solid_files.h"
 #include "tools/units.h"
@@ -152,6 +153,9 @@ std::vector<std::string> render_turn(const RenderArgs& args, const TriMesh& mesh
                         std::to_string(rows) +
                         " pictures is larger than 16384 pixels; use a smaller --size, or # in the "
                         "name for a file each");
+    std::optional<FileSet> pictures; // of one folder, whatever else is in it
+    if (apart)
+        pictures.emplace(args.out.parent_path());
     Image sheet = apart ? Image() : Image(columns * s.width, rows * s.height, 3);
     std::vector<std::string> files;
     for (int i = 0; i < n; ++i) {
@@ -163,7 +167,9 @@ std::vector<std::string> render_turn(const RenderArgs& args, const TriMesh& mesh
         if (apart) {
             const std::filesystem::path file = numbered(args.out, i);
             console.may_write(file);
-            write_image(file, image);
+            pictures->add_by([&](const std::filesystem::path& folder) {
+                write_image(folder / file.filename(), image);
+            });
             files.push_back(file.string());
             continue;
         }
@@ -171,7 +177,9 @@ std::vector<std::string> render_turn(const RenderArgs& args, const TriMesh& mesh
             std::copy_n(image.at(0, y), 3 * s.width,
                         sheet.at(i % columns * s.width, i / columns * s.height + y));
     }
-    if (!apart) {
+    if (apart) {
+        pictures->publish(std::filesystem::path(files.back()).filename());
+    } else {
         write_image(args.out, sheet);
         files.push_back(args.out.string());
     }

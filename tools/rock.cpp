@@ -1,6 +1,6 @@
 // taihu rock: a whole recipe, made.
 #include "stats/core/error.h"
-#include "stats/core/file.h"
+#include "stats/core/file_set.h"
 #include "stats/core/text.h"
 #include "stats/io/holes_file.h"
 #include "tools/baked_files.h"
@@ -120,12 +120,13 @@ void estimate(const Source& source, const RecipeAssets& assets, const RecipeSett
                     {"fits", bytes <= e.limit_bytes}});
 }
 
-void write_holes(const RockArgs& args, const std::vector<Sphere>& holes, const std::string& where,
-                 const Console& console) {
+/// The table of holes, which comes into view after the rock.
+void add_holes(const RockArgs& args, const std::vector<Sphere>& holes, const std::string& where,
+               OutputFiles& files, const Console& console) {
     if (args.holes.empty())
         return;
     const std::vector<std::string> comments = {"holes of " + where};
-    write_file(args.holes, format_holes(holes, comments));
+    files.add(args.holes, format_holes(holes, comments));
     console.say("{}: {} holes", args.holes.string(), holes.size());
 }
 
@@ -177,19 +178,23 @@ void run(const RockArgs& args, const Console& console) {
     const RecipeAssets assets = recipe_assets(source.folders, console);
     if (args.dry_run)
         return estimate(source, assets, recipe_settings(args), console);
+    OutputFiles holes;
     if (args.tiles.tiles) {
         const RecipeTiles made =
             make_recipe_tiles(source.text, source.where, assets, recipe_settings(args), args.out,
                               *args.tiles.tiles, console.progress);
         console.say_all(args.out.string(), made.found);
-        write_holes(args, made.holes, source.where, console);
+        add_holes(args, made.holes, source.where, holes, console);
+        holes.publish();
         return console.result(tiles_result(args.out, made.tiles, console));
     }
     const RecipeSolid made =
         make_recipe(source.text, source.where, assets, recipe_settings(args), console.progress);
     console.say_all(args.out.string(), made.found);
-    write_holes(args, made.holes, source.where, console);
-    console.result(write_rock(args, made, console));
+    add_holes(args, made.holes, source.where, holes, console);
+    const auto json = write_rock(args, made, console);
+    holes.publish();
+    console.result(json);
 }
 
 } // namespace

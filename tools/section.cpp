@@ -1,11 +1,9 @@
 // taihu section: a solid cut by planes, its holes as profiles and as labelled photos.
 #include "vdb_ops/section.h"
 
-#include <unistd.h>
-
 #include "mesh_out/io/image_file.h"
 #include "stats/core/error.h"
-#include "stats/core/file.h"
+#include "stats/core/file_set.h"
 #include "stats/io/holes_file.h"
 #include "stats/io/labelme_writer.h"
 #include "tools/solid_files.h"
@@ -42,7 +40,7 @@ struct SectionArgs {
     PhotoArgs photos;
 };
 
-/// The files of one photo.
+/// The files of one photo, in a folder.
 struct PhotoFiles {
     std::filesystem::path picture, mask, labels;
     PhotoFiles(const std::filesystem::path& folder, std::size_t plane) {
@@ -72,27 +70,30 @@ struct PhotoTotals {
     }
 };
 
-void open_folder(const SectionArgs& args, const Console& console) {
+void check_folder(const SectionArgs& args, const Console& console) {
     const std::filesystem::path& folder = args.photos.folder;
-    std::error_code error;
-    std::filesystem::create_directories(folder, error);
-    if (error || !std::filesystem::is_directory(folder))
-        throw Error(Fault::io, folder.string() + ": cannot make this folder: " +
-                                   (error ? error.message() : "a file has its name") +
-                                   "; choose another");
-    if (::access(folder.c_str(), W_OK | X_OK) != 0)
-        throw Error(Fault::io, folder.string() + ": nothing can be written into this folder; "
-                                                 "choose another");
-    for (int i = 0; i < args.settings.n_planes; ++i) {
+    std::error_code ignored;
+    for (int i = 0; i < args.settings.n_planes && std::filesystem::is_directory(folder, ignored);
+         ++i) {
         const PhotoFiles files(folder, static_cast<std::size_t>(i));
         for (const auto& file : {files.picture, files.mask, files.labels})
             console.may_write(file, {args.solid.path, args.base, args.holes, args.out});
     }
 }
 
+void write_photo(const SectionPhoto& photo, const PhotoFiles& files) {
+    write_image(files.picture, photo.picture);
+    write_image(files.mask, photo.mask);
+    std::vector<Segment> segments = photo.holes;
+    segments.push_back(photo.scale_bar);
+    write_file(files.labels, format_labelme(base_name(files.picture), photo.picture.width,
+                                            photo.picture.height, segments));
+}
+
 PhotoTotals write_photos(const Section& cut, const openvdb::FloatGrid& solid,
                          const SectionKnown& known, const SectionArgs& args,
-                         const SectionPhotoSettings& settings, const Console& console) {
+                         const SectionPhotoSettings& settings, FileSet& set,
+                         const Console& console) {
     PhotoTotals totals;
     for (std::size_t i = 0; i < cut.planes.size(); ++i) {
         const PhotoFiles files(args.photos.folder, i);
@@ -102,12 +103,9 @@ PhotoTotals write_photos(const Section& cut, const openvdb::FloatGrid& solid,
         }
         const SectionPhoto photo =
             section_photo(solid, known, cut.planes[i], settings, console.progress);
-        write_image(files.picture, photo.picture);
-        write_image(files.mask, photo.mask);
-        std::vector<Segment> segments = photo.holes;
-        segments.push_back(photo.scale_bar);
-        write_file(files.labels, format_labelme(base_name(files.picture), photo.picture.width,
-                                                photo.picture.height, segments));
+        set.add_by([&](const std::filesystem::path& folder) {
+            write_photo(photo, PhotoFiles(folder, i));
+        });
         console.say("{}: {} x {} pixels, {} holes marked", files.labels.string(),
                     photo.picture.width, photo.picture.height, photo.holes.size());
         totals.add(photo);
@@ -204,8 +202,11 @@ void run(SectionArgs args, const Console& console) {
                     "section: nothing to write; give -o profiles.csv, --photos DIR, or both");
     if (!args.out.empty())
         console.may_write(args.out);
-    if (has_photos)
-        open_folder(args, console);
+    std::optional<FileSet> photos;
+    if (has_photos) {
+        check_folder(args, console);
+        photos.emplace(args.photos.folder);
+    }
     if (!args.direction.empty())
         args.settings.direction = {args.direction[0], args.direction[1], args.direction[2]};
     Inputs in;
@@ -215,16 +216,23 @@ void run(SectionArgs args, const Console& console) {
     const auto n_clipped = std::count_if(cut.profiles.begin(), cut.profiles.end(),
                                          [](const Profile& p) { return p.clipped; });
     auto json = section_json(cut, n_clipped, args.out.string());
+    OutputFiles table;
     if (!args.out.empty()) {
-        write_file(args.out, format_profiles(cut, args.major));
+        table.add(args.out, format_profiles(cut, args.major));
         tell(cut, n_clipped, args, console);
     }
     if (has_photos) {
         const PhotoTotals totals =
-            write_photos(cut, *in.solid.grid, in.known, args, photo_settings, console);
+            write_photos(cut, *in.solid.grid, in.known, args, photo_settings, *photos, console);
+        photos->list();
         tell_photos(totals, args, console);
         json["photos"] = photos_json(totals, args);
     }
+    const Publishing together;
+    check_cancelled(console.progress);
+    if (photos)
+        photos->publish(kFileListName);
+    table.publish();
     console.result(json);
 }
 

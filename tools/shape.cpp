@@ -156,13 +156,15 @@ void run(ShapeArgs& args, const CLI::App& verb, const Console& console) {
         args.settings.around = args.exponents.back();
     }
     const TriMesh mesh = shape_mesh(args.settings); // refuses settings out of range
-    if (!args.stages.empty())
-        write_stages(args.settings,
-                     args.bump == "static" ? StageBump::static_map : StageBump::dynamic,
-                     args.stages, console);
-    const Box box = shape_box(args.settings);
+    check_cancelled(console.progress);
     check_solid_path(args.out);
     console.may_write(args.out);
+    std::unique_ptr<FileSet> stages;
+    if (!args.stages.empty())
+        stages = make_stages(args.settings,
+                             args.bump == "static" ? StageBump::static_map : StageBump::dynamic,
+                             args.stages, console);
+    const Box box = shape_box(args.settings);
     say_crossings(args, mesh, console);
     const std::string node = shape_node(args.settings);
     nlohmann::ordered_json json = {{"file", args.out.string()}, {"kind", args.kind}};
@@ -200,6 +202,8 @@ void run(ShapeArgs& args, const CLI::App& verb, const Console& console) {
         console.say("{}: {}, {} triangles, {:.4g} m^3", args.out.string(), args.kind,
                     mesh.triangles.size(), signed_volume_m3(mesh));
     }
+    if (stages)
+        stages->publish(kFileListName);
     console.result(json);
 }
 

@@ -9,7 +9,6 @@
 #include "mesh_out/io/mesh_file.h"
 #include "mesh_out/render.h"
 #include "stats/core/error.h"
-#include "stats/core/file.h"
 #include "stats/core/rng.h"
 #include "vdb_ops/recipe.h"
 
@@ -97,35 +96,41 @@ std::array<Stage, 9> stages_of(const ShapeSettings& s, StageBump bump) {
 
 } // namespace
 
-void write_stages(const ShapeSettings& settings, StageBump bump,
-                  const std::filesystem::path& folder, const Console& console) {
+std::unique_ptr<FileSet> make_stages(const ShapeSettings& settings, StageBump bump,
+                                     const std::filesystem::path& folder, const Console& console) {
     if (settings.kind != ShapeKind::fractal_rock ||
         settings.fractal.damping != Damping::interpolating)
         throw Error(Fault::bad_argument, "--stages: are those of a fractal_rock with "
                                          "interpolating damping; ask for one");
-    std::error_code failed;
-    std::filesystem::create_directories(folder, failed);
-    if (failed)
-        throw Error(Fault::io, folder.string() + ": " + failed.message() + "; choose another");
     report_stage(console.progress, "stages");
+    const bool is_there = std::filesystem::is_directory(folder);
+    auto set = std::make_unique<FileSet>(folder);
     const Rng rng{settings.seed, kGrainStream};
     for (const Stage& stage : stages_of(settings, bump)) {
-        const std::filesystem::path mesh = folder / (std::string(stage.name) + ".glb"),
-                                    picture = folder / (std::string(stage.name) + ".png");
-        console.may_write(mesh);
-        console.may_write(picture);
+        check_cancelled(console.progress);
+        const std::string mesh = std::string(stage.name) + ".glb",
+                          picture = std::string(stage.name) + ".png",
+                          where = (folder / mesh).string();
+        for (const std::string& name : {mesh, picture})
+            if (is_there)
+                console.may_write(folder / name);
         const std::string bytes = format_mesh(stage.mesh, MeshFormat::glb);
-        require_certificate(certify(parse_mesh(bytes, MeshFormat::glb, mesh.string(), {.is_own = true}).levels.at(0)),
-                            mesh.string());
-        write_file(mesh, bytes);
+        require_certificate(
+            certify(parse_mesh(bytes, MeshFormat::glb, where, {.is_own = true}).levels.at(0)),
+            where);
+        set->add(mesh, bytes);
         RenderSettings look{.width = 360, .height = 360, .wireframe = !stage.lit};
         if (stage.textured)
             look.albedo_at = [&](const Vec3& p, const Vec3&) {
                 return 0.5 * (1 + 0.7 * grain(rng, p));
             };
-        write_image(picture, render(stage.mesh, look, console.progress));
-        console.say("{}: {} triangles", mesh.string(), stage.mesh.triangles.size());
+        const Image image = render(stage.mesh, look, console.progress);
+        set->add_by(
+            [&](const std::filesystem::path& staging) { write_image(staging / picture, image); });
+        console.say("{}: {} triangles", where, stage.mesh.triangles.size());
     }
+    set->list();
+    return set;
 }
 
 } // namespace taihu

@@ -320,6 +320,7 @@ nlohmann::ordered_json write_solid(const std::filesystem::path& path,
     nlohmann::ordered_json json = {{"file", path.string()}};
     if (is_vdb(path)) {
         report_stage(console.progress, "writing");
+        check_cancelled(console.progress);
         write_vdb(path, grid, recipe);
         json["leaves"] = grid.tree().leafCount();
         console.say("{}: level set, voxel {:.4g} m, {} leaves", path.string(), measure.voxel_m,
@@ -327,6 +328,7 @@ nlohmann::ordered_json write_solid(const std::filesystem::path& path,
     } else {
         const SurfaceFile file =
             format_surface(grid, field, *mesh_format(path), surface, recipe, console.progress);
+        check_cancelled(console.progress);
         write_file(path, file.bytes);
         json["bytes"] = file.bytes.size();
         json["bound_m"] = file.bound_m;

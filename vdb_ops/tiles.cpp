@@ -7,7 +7,9 @@
 
 #include "stats/core/error.h"
 #include "stats/core/file.h"
+#include "stats/core/file_set.h"
 #include "stats/core/sha256.h"
+#include "stats/core/temporary_detail.h"
 #include "stats/core/text.h"
 #include "stats/io/json_detail.h"
 #include "vdb_ops/rasterize.h"
@@ -76,49 +78,47 @@ std::string format_tile_set(const TileSet& set) {
     return out.dump(1) + "\n";
 }
 
-/// A folder for tiles: new, empty, or with an earlier set, which is removed.
-void make_room(const fs::path& folder) {
-    std::error_code error;
-    fs::create_directory(folder, error);
-    if (!fs::is_directory(folder))
-        throw Error(Fault::io, folder.string() + ": cannot be made a folder; choose another name");
-    const fs::path manifest = folder / kTileSetName;
-    if (fs::exists(manifest)) {
-        const TileSet old = read_tile_set(manifest);
-        fs::remove(manifest, error);
-        for (const Tile& t : old.tiles)
-            fs::remove(folder / t.file, error);
+/// Whether a name is one of file_name()'s.
+bool is_tile_name(const std::string& name) {
+    return name.starts_with("tile_") && name.ends_with(".vdb") &&
+           name.find_first_not_of("0123456789_-", 5) == name.size() - 4;
+}
+
+/// The tiles in a folder that holds nothing else: an earlier set, of which a run that was killed
+/// while it replaced them may have left no list.
+std::vector<std::string> earlier_tiles(const fs::path& folder) {
+    std::vector<std::string> names;
+    std::error_code failed;
+    for (fs::directory_iterator entry(folder, failed), end; !failed && entry != end;
+         entry.increment(failed)) {
+        const std::string name = entry->path().filename().string();
+        if (is_tile_name(name))
+            names.push_back(name);
+        else if (name != kTileSetName && !is_temporary(name))
+            throw Error(Fault::io, folder.string() + ": a folder with other files; choose a new "
+                                                     "one for the tiles");
     }
-    if (!fs::is_empty(folder))
-        throw Error(Fault::io, folder.string() +
-                                   ": a folder with other files; choose a new one for the tiles");
+    return names;
 }
 
 /// The work of write_tiles().
 class TileWriter {
 public:
-    TileWriter(const fs::path& folder, const LatticeField& field, const Lattice& lattice,
+    TileWriter(FileSet& files, const LatticeField& field, const Lattice& lattice,
                const TileSettings& settings, Progress* progress)
-        : folder_(folder), field_(field), lattice_(lattice), settings_(settings),
-          progress_(progress), tiles_(field.bounds(), settings.tile_voxels), parts_(tiles_) {
+        : files_(files), field_(field), lattice_(lattice), settings_(settings), progress_(progress),
+          tiles_(field.bounds(), settings.tile_voxels), parts_(tiles_) {
         result_.set.lattice = lattice;
         result_.set.tile_voxels = settings.tile_voxels;
     }
 
     TilesResult run() {
-        try {
-            if (settings_.clean)
-                choose();
-            report_stage(progress_, "writing tiles");
-            for (std::size_t n = 0; n < tiles_.size(); ++n) {
-                report_fraction(progress_, double(n) / double(tiles_.size()));
-                write(tiles_.tile(n), n);
-            }
-        } catch (...) {
-            std::error_code ignored;
-            for (const Tile& t : result_.set.tiles)
-                fs::remove(folder_ / t.file, ignored);
-            throw;
+        if (settings_.clean)
+            choose();
+        report_stage(progress_, "writing tiles");
+        for (std::size_t n = 0; n < tiles_.size(); ++n) {
+            report_fraction(progress_, double(n) / double(tiles_.size()));
+            write(tiles_.tile(n), n);
         }
         return result_;
     }
@@ -179,18 +179,17 @@ private:
         tile.file = file_name(box);
         tile.box = box;
         tile.n_leaves = grid->tree().leafCount();
-        const fs::path path = folder_ / tile.file;
         const ordered_json about = {{"box", box_json(box)}, {"of", kTileSetName}};
-        const std::string bytes = format_vdb(*grid, "", path.string(), about.dump());
+        const std::string bytes = format_vdb(*grid, "", tile.file, about.dump());
         tile.n_bytes = bytes.size();
         tile.sha256 = sha256_hex(bytes);
         result_.volume_m3 += volume_m3(*grid);
-        result_.set.tiles.push_back(tile); // before it is there, so that it is removed on failure
-        write_file(path, bytes);
+        files_.add(tile.file, bytes);
+        result_.set.tiles.push_back(std::move(tile));
         report_fraction(progress_, double(n + 1) / double(tiles_.size()));
     }
 
-    fs::path folder_;
+    FileSet& files_;
     const LatticeField& field_;
     Lattice lattice_;
     const TileSettings& settings_;
@@ -235,10 +234,13 @@ TilesResult write_tiles(const fs::path& folder, const Field& field, const Lattic
                     "the whole with a larger voxel");
     empty_level_set(lattice); // refuses what is none
     const auto sampled = field.on(lattice, CoordBBox::inf());
-    make_room(folder);
-    TilesResult result = TileWriter(folder, *sampled, lattice, settings, progress).run();
+    const std::vector<std::string> earlier = earlier_tiles(folder);
+    FileSet files(folder);
+    TilesResult result = TileWriter(files, *sampled, lattice, settings, progress).run();
     result.set.recipe = recipe;
-    write_file(folder / kTileSetName, format_tile_set(result.set));
+    files.add(kTileSetName, format_tile_set(result.set));
+    check_cancelled(progress);
+    files.publish(kTileSetName, earlier);
     return result;
 }
 

@@ -45,14 +45,15 @@ struct TilesResult {
     double volume_m3 = 0; ///< as volume_m3() of the whole, but for the order of the sum
 };
 
-/// The level set of a field, tile by tile, into `folder`: made when it is not there, tiles of an
-/// earlier set in it replaced. The union of the tiles is, bit for bit, what rasterize() gives, and
-/// with `clean` what clean() makes of that. Memory: the field's and that of a tile, with cleaning
-/// of the voxels that change side, too. Cleaning goes over the field three times: parts are named,
-/// joined over the faces of tiles and chosen; their voxels are marked; tiles are made, each with as
-/// much around it as rebuilding looks at.
-/// \throws Error bad_argument: an edge out of range, as rasterize(); bad_input as clean(); io: the
-///   folder holds other files; cancelled: no tile is left.
+/// The level set of a field, tile by tile, into `folder`: made when it is not there; an earlier set
+/// in it is there until all tiles are written, and then replaced by them (see FileSet). The union
+/// of the tiles is, bit for bit, what rasterize() gives, and with `clean` what clean() makes of
+/// that. Memory: the field's and that of a tile, with cleaning of the voxels that change side, too.
+/// Cleaning goes over the field three times: parts are named, joined over the faces of tiles and
+/// chosen; their voxels are marked; tiles are made, each with as much around it as rebuilding looks
+/// at. \throws Error bad_argument: an edge out of range, as rasterize(); bad_input as clean(); io:
+/// the
+///   folder holds other files; whatever is thrown: no tile is left, and an earlier set untouched.
 TilesResult write_tiles(const std::filesystem::path& folder, const Field& field,
                         const Lattice& lattice, const TileSettings& settings,
                         const std::string& recipe, Progress* progress = nullptr);

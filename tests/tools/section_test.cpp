@@ -192,8 +192,10 @@ TEST(SectionVerb, RefusesByName) {
     fails("ball.vdb --photos p --tilt 1rad", 2, "--tilt: '1rad' is no angle; write 25deg");
     fails("ball.vdb --photos p --pixel 1um", 2, "; choose pixels from ");
     fails("ball.vdb --photos p --scale-bar 9m", 2, "scale_bar_m is 9, longer than the picture");
-    fails("ball.vdb --photos ball.vdb", 1, "ball.vdb: cannot make this folder");
-    fails("ball.vdb --photos ball.vdb/p", 1, "ball.vdb/p: cannot make this folder");
+    fails("ball.vdb --photos ball.vdb", 1, "ball.vdb: is no folder");
+    fails("ball.vdb --photos ball.vdb/p", 1, "ball.vdb/p: ball.vdb is no folder");
+    EXPECT_FALSE(std::filesystem::exists(scratch / "p")); // what fails makes no folder
+    std::filesystem::create_directory(scratch / "p");
     write_file(scratch / "p/plane-2.json", "mine");
     fails("ball.vdb --photos p --planes 3 --no-clobber", 1, "p/plane-2.json: exists");
     EXPECT_EQ(read_file(scratch / "p/plane-2.json"), "mine");

@@ -162,13 +162,27 @@ private:
     bool last_ = false, stop_ = false;
 };
 
+TEST(Tiles, CancelledLeavesTheEarlierSet) {
+    const Scratch folder;
+    write_tiles(folder / "t", holed_ball(3), {0.02, {}, 3}, {128, {}}, "");
+    const std::string before = read_file(folder / "t" / kTileSetName);
+    StopAt stop;
+    expect_error(Fault::cancelled, "", [&] {
+        write_tiles(folder / "t", holed_ball(10), {0.01, {}, 3}, {128, {}}, "", &stop);
+    });
+    EXPECT_EQ(read_file(folder / "t" / kTileSetName), before);
+    read_tiles(folder / "t" / kTileSetName); // with the hash of each
+    for (const auto& f : std::filesystem::directory_iterator(folder / "t"))
+        EXPECT_FALSE(f.is_directory()) << f.path();
+}
+
 TEST(Tiles, CancelledLeavesNoTile) {
     const Scratch folder;
     StopAt stop;
     expect_error(Fault::cancelled, "", [&] {
         write_tiles(folder / "t", holed_ball(10), {0.01, {}, 3}, {128, {}}, "", &stop);
     });
-    EXPECT_TRUE(std::filesystem::is_empty(folder / "t"));
+    EXPECT_TRUE(std::filesystem::is_empty(folder.path()));
 }
 
 TEST(Tiles, RefuseWhatIsNoSet) {
