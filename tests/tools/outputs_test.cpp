@@ -108,13 +108,14 @@ TEST(Backstop, EndsWorkThatDoesNotLookUp) {
     Finished said;
     // 1.3 million triangles are looked at for crossings without a look at signals.
     EXPECT_LT(seconds_of([&] {
-                  said = run("timeout -s TERM --preserve-status 0.3 taihu shape boulder "
+                  said = run("timeout -s TERM --preserve-status 0.6 taihu shape boulder "
                              "--subdivisions 8 -q -o x.glb",
                              folder.path());
               }),
-              2.3);
+              2.6);
     EXPECT_EQ(said.exit_code, 143);
-    EXPECT_EQ(said.err, "taihu: stopped; no output was written\n");
+    // Nothing where the machine is so busy that the program has not begun.
+    EXPECT_THAT(said.err, testing::AnyOf("", "taihu: stopped; no output was written\n"));
     EXPECT_EQ(n_entries(folder.path()), 0);
 }
 
