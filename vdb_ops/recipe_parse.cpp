@@ -10,6 +10,7 @@
 
 #include "stats/core/error.h"
 #include "stats/core/file.h"
+#include "stats/core/folder_file.h"
 #include "stats/core/rng.h"
 #include "stats/core/sha256.h"
 #include "stats/core/text.h"
@@ -290,7 +291,8 @@ Node parse_material(const json& body, const std::string& where, RecipeParser& pa
     const Keys keys(body, where, {});
     if (!parser.material)
         refuse(where, "the recipe has no 'material'; add one beside 'solid'");
-    return parse_holes(*parser.material, "material", parser);
+    return parse_holes(*parser.material, where.substr(0, where.find(": solid")) + ": material",
+                       parser);
 }
 
 constexpr std::pair<std::string_view, Parse> kNodes[] = {
@@ -335,15 +337,14 @@ std::vector<Node> parse_children(const Keys& keys, RecipeParser& parser, std::si
 
 std::filesystem::path file_of(const Keys& keys, const char* key, const RecipeParser& parser) {
     const std::string name = keys.text(key), sha256 = keys.text("sha256");
-    if (name.empty() || name != base_name(name) || name == "." || name == "..")
+    if (!is_plain_name(name))
         refuse(keys.where(), "'" + std::string(key) + "' is '" + printable(name) +
                                  "'; must be a name without folders");
     for (const std::filesystem::path& folder : parser.assets.folders) {
-        const std::filesystem::path path = folder / name;
-        std::error_code ignored;
-        if (!std::filesystem::is_regular_file(path, ignored))
+        const auto path = file_in(folder, name);
+        if (!path)
             continue;
-        const std::string found = sha256_hex(read_file(path));
+        const std::string found = sha256_hex(read_file(*path));
         if (found != sha256)
             refuse(keys.where(), "'" + name +
                                      "' is another file than the one the recipe means "
@@ -352,7 +353,7 @@ std::filesystem::path file_of(const Keys& keys, const char* key, const RecipePar
                                      printable(sha256.substr(0, 8)) +
                                      "); find that one, or correct "
                                      "sha256");
-        return path;
+        return *path;
     }
     throw Error(Fault::io, keys.where() + ": there is no file '" + name +
                                "' beside the recipe; put it there, or name its folder (--assets)");

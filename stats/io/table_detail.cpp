@@ -169,9 +169,13 @@ std::size_t Table::column(std::string_view name) const {
 }
 
 void Table::check_header(std::span<const std::string_view> known) const {
-    for (const std::string_view name : header_)
-        if (std::find(known.begin(), known.end(), name) == known.end())
-            refuse_line(0, "unknown column '" + printable(name) + "'" + did_you_mean(name, known));
+    for (const std::string_view name : header_) {
+        if (std::find(known.begin(), known.end(), name) != known.end())
+            continue;
+        const std::string nearest = did_you_mean(name, known);
+        refuse_line(0, "unknown column '" + printable(name) + "'" +
+                           (nearest.empty() ? "; drop it, or give it a known name" : nearest));
+    }
 }
 
 double Table::number(std::size_t row, std::size_t column) const {
