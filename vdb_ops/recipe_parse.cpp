@@ -30,6 +30,13 @@ constexpr std::uint32_t kSeedStream = 0x72637065;
 constexpr double kMost_m = kMostLength_m;
 constexpr double kMostSeed = 1.8446744073709551e19;
 
+[[noreturn]] void refuse_unknown(const std::string& where, const char* what,
+                                 const std::string& name, std::span<const std::string_view> known) {
+    const std::string nearest = did_you_mean(name, known);
+    refuse(where, "unknown " + std::string(what) + " '" + printable(name) + "'" +
+                      (nearest.empty() ? "; use one of the recipe's schema" : nearest));
+}
+
 FractalSettings fractal_of(const Keys& keys) {
     FractalSettings f;
     if (keys.has("base"))
@@ -230,7 +237,7 @@ Pattern parse_pattern(const json& pattern, const std::string& where) {
     }
     static constexpr std::string_view kKinds[] = {"thomas", "matern", "joints", "hard_core",
                                                   "lattice"};
-    refuse(where, "unknown pattern '" + printable(kind) + "'" + did_you_mean(kind, kKinds));
+    refuse_unknown(where, "pattern", kind, kKinds);
 }
 
 Box parse_box(const Keys& keys) {
@@ -375,19 +382,26 @@ std::unique_ptr<RecipeNode> parse_node(const json& node, const std::string& wher
     const std::string kind = node.begin().key();
     const json& body = node.begin().value();
     const std::string inside = where + "." + printable(kind);
-    for (const auto& [name, parse] : kNodes)
-        if (name == kind)
-            return parse(body, inside, parser);
+    try {
+        for (const auto& [name, parse] : kNodes)
+            if (name == kind)
+                return parse(body, inside, parser);
+        for (int i = 0; i <= static_cast<int>(ShapeKind::fractal_rock); ++i)
+            if (const auto shape = static_cast<ShapeKind>(i); shape_name(shape) == kind)
+                return parse_shape(shape, body, inside, parser);
+    } catch (const Error& e) { // what would be an argument's fault is the file's here
+        if (e.fault() != Fault::bad_argument)
+            throw;
+        const std::string_view what = e.what();
+        throw Error(Fault::bad_input,
+                    what.starts_with(inside) ? e.what() : inside + ": " + e.what());
+    }
     std::vector<std::string_view> known;
     for (const auto& [name, parse] : kNodes)
         known.push_back(name);
-    for (int i = 0; i <= static_cast<int>(ShapeKind::fractal_rock); ++i) {
-        const auto shape = static_cast<ShapeKind>(i);
-        if (shape_name(shape) == kind)
-            return parse_shape(shape, body, inside, parser);
-        known.push_back(shape_name(shape));
-    }
-    refuse(where, "unknown kind '" + printable(kind) + "'" + did_you_mean(kind, known));
+    for (int i = 0; i <= static_cast<int>(ShapeKind::fractal_rock); ++i)
+        known.push_back(shape_name(static_cast<ShapeKind>(i)));
+    refuse_unknown(where, "kind", kind, known);
 }
 
 } // namespace taihu

@@ -147,7 +147,7 @@ std::optional<RecipeLod> lod_of(const json& recipe, const std::string& where, do
     if (own.contains("origin")) {
         const std::string origin = json_text(own, inside, "origin");
         if (origin != "foot" && origin != "world")
-            throw Error(Fault::bad_input, inside + ": 'origin' must be foot or world");
+            throw Error(Fault::bad_input, inside + ": 'origin' must be foot or world; correct it");
         lod.at_foot = origin == "foot";
     }
     if (own.contains("maps")) {

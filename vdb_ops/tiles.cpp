@@ -28,7 +28,7 @@ using TopNode = openvdb::FloatTree::RootNodeType::ChildNodeType;
 using Node = TopNode::ChildNodeType;
 
 constexpr int kVersion = 1;
-constexpr double kMostVoxel = 0x1p31;
+constexpr double kMostVoxel = 0x1p30;
 
 ordered_json box_json(const CoordBBox& box) {
     return {{box.min().x(), box.min().y(), box.min().z()},
@@ -47,6 +47,10 @@ CoordBBox box_of(const json& box, const std::string& where) {
                                                       "numbers each; correct it");
             corners[c][static_cast<int>(axis)] = box[c][axis].get<int>();
         }
+    if (!(corners[0][0] <= corners[1][0] && corners[0][1] <= corners[1][1] &&
+          corners[0][2] <= corners[1][2]))
+        throw Error(Fault::bad_input,
+                    where + ": 'box' has its corners in the wrong order; give the lower one first");
     return {corners[0], corners[1]};
 }
 

@@ -20,12 +20,6 @@ constexpr std::size_t kMostValues = 8'000'000;
     throw Error(Fault::bad_input, where + ": " + what);
 }
 
-// What to do about a name that is not known.
-std::string suggestion(std::string_view name, std::span<const std::string_view> known) {
-    const std::string nearest = did_you_mean(name, known);
-    return nearest.empty() ? "; drop it" : nearest;
-}
-
 // `where:line:column` of a byte; columns count characters, not bytes.
 std::string place(std::string_view where, std::string_view text, std::size_t byte) {
     const std::string_view before = text.substr(0, byte);
@@ -131,9 +125,13 @@ void check_keys(const json& object, const std::string& where,
         refuse(where, "is " + std::string(object.type_name()) + ", must be an object; correct it");
     std::vector<std::string_view> known(required.begin(), required.end());
     known.insert(known.end(), optional.begin(), optional.end());
-    for (const auto& [key, value] : object.items())
-        if (std::find(known.begin(), known.end(), key) == known.end())
-            refuse(where, "unknown key '" + printable(key) + "'" + suggestion(key, known));
+    for (const auto& [key, value] : object.items()) {
+        if (std::find(known.begin(), known.end(), key) != known.end())
+            continue;
+        const std::string nearest = did_you_mean(key, known);
+        refuse(where, "unknown key '" + printable(key) + "'" +
+                          (nearest.empty() ? "; drop it" : nearest));
+    }
     for (const std::string_view key : required)
         if (!object.contains(key))
             refuse(where, "key '" + std::string(key) + "' is missing; add it");

@@ -61,6 +61,8 @@ std::string_view Table::decoded(std::string_view text) {
         text.remove_prefix(3);
     if (!is_utf8(text))
         refuse_line(0, "is not UTF-8 text; save it as UTF-8, in a spreadsheet as 'CSV UTF-8'");
+    if (text.find('\0') != std::string_view::npos)
+        refuse_line(0, "holds zero bytes, so it is no table; save it as CSV (UTF-8)");
     return text;
 }
 

@@ -14,27 +14,13 @@
 #include "stats/io/measurements.h"
 #include "stats/io/photo_mask_detail.h"
 #include "tests/support/mutate.h"
-#include "vdb_ops/recipe_solid.h"
+#include "vdb_ops/recipe.h"
 #include "vdb_ops/relief.h"
-#include "vdb_ops/tiles.h"
-#include "vdb_ops/vdb_file.h"
 
 namespace taihu {
 namespace {
 
 namespace fs = std::filesystem;
-
-void demand(bool sound, const char* what) {
-    if (!sound)
-        throw Unsound(what);
-}
-
-/// The file that the readers of paths get; nothing of it is synced, as write_file() would.
-fs::path in_file(const std::string& bytes, const fs::path& folder, const char* name) {
-    const fs::path path = folder / name;
-    std::ofstream(path, std::ios::binary).write(bytes.data(), std::streamsize(bytes.size()));
-    return path;
-}
 
 void check_level(const TriMesh& mesh) {
     demand(!mesh.triangles.empty(), "a mesh without triangles");
@@ -64,16 +50,6 @@ void read_mesh_bytes(const std::string& bytes, const fs::path&) {
                        [](double v) { return std::isfinite(v); }),
            "a coverage that is not finite");
     (void)recipe_solid(file.recipe); // what `info` and `rock --from` do with it
-}
-
-void read_vdb_bytes(const std::string& bytes, const fs::path& folder) {
-    const VdbFile file = read_solid_vdb(in_file(bytes, folder, "mutant.vdb"));
-    demand(file.solid != nullptr, "no grid");
-    for (auto value = file.solid->cbeginValueAll(); value; ++value)
-        demand(std::isfinite(*value), "a voxel that is not finite");
-    const double voxel_m = file.solid->voxelSize()[0];
-    demand(std::isfinite(voxel_m) && voxel_m > 0, "a voxel without a size");
-    (void)recipe_solid(file.recipe);
 }
 
 void read_exr_bytes(const std::string& bytes, const fs::path& folder) {
@@ -122,7 +98,7 @@ void read_marks_bytes(const std::string& bytes, const fs::path& folder) {
 }
 
 constexpr const char *kCsv = "mutant.csv", *kJson = "mutant.json", *kXml = "mutant.xml",
-                     *kRoi = "mutant.roi", *kZip = "mutant.zip";
+                     *kZip = "mutant.zip";
 
 /// Ten times over, because a sample has eight or more.
 void read_roi_bytes(const std::string& bytes, const fs::path& folder) {
@@ -142,47 +118,6 @@ void read_relief_bytes(const std::string& bytes, const fs::path&) {
     const ReliefSettings settings = parse_relief(bytes, kJson);
     demand(parse_relief(format_relief(settings), kJson).pixel_m == settings.pixel_m,
            "written, it reads otherwise");
-}
-
-void read_tiles_bytes(const std::string& bytes, const fs::path& folder) {
-    const TileSet set = read_tile_set(in_file(bytes, folder, kJson));
-    demand(set.lattice.voxel_m > 0 && is_finite(set.lattice.origin), "no lattice");
-    for (const Tile& tile : set.tiles) {
-        demand(tile.file.find('/') == std::string::npos && tile.file.size() <= 255, "a path");
-        demand(!tile.box.empty(), "a box without voxels");
-    }
-}
-
-/// A recipe was read, and is not made.
-struct WasRead {};
-
-class StopAfterReading final : public Progress {
-public:
-    void stage(std::string_view name) override {
-        if (name == "estimating")
-            throw WasRead{};
-    }
-    void fraction(double) override {}
-    bool cancelled() const override { return false; }
-};
-
-void read_recipe_bytes(const std::string& bytes, const fs::path& folder) {
-    static const fs::path files = [&] {
-        write_recipe_files(folder);
-        return folder;
-    }();
-    const RecipeAssets assets{
-        {files},
-        [](const fs::path& file, double unit_m, bool z_up) {
-            return read_mesh(file, {unit_m, z_up ? UpAxis::z : UpAxis::y}).levels.front();
-        },
-        [](const fs::path& path) { return read_relief(path); }};
-    StopAfterReading stop;
-    try {
-        (void)estimate_recipe(bytes, kJson, assets, {}, &stop);
-    } catch (const WasRead&) {
-    }
-    (void)recipe_solid(bytes);
 }
 
 std::uint32_t big_word(const std::string& bytes, std::size_t at) {
@@ -253,6 +188,17 @@ constexpr FuzzFormat kFormats[] = {
     {"zip", "mutant.zip", zip_bases, read_marks_bytes<kZip>}};
 
 } // namespace
+
+void demand(bool sound, const char* what) {
+    if (!sound)
+        throw Unsound(what);
+}
+
+fs::path in_file(const std::string& bytes, const fs::path& folder, const char* name) {
+    const fs::path path = folder / name;
+    std::ofstream(path, std::ios::binary).write(bytes.data(), std::streamsize(bytes.size()));
+    return path;
+}
 
 std::span<const FuzzFormat> fuzz_formats() {
     return kFormats;

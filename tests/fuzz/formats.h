@@ -34,7 +34,19 @@ std::span<const FuzzFormat> fuzz_formats();
 std::string mutated_file(const FuzzFormat& format, std::span<const std::string> bases,
                          std::uint64_t seed, std::uint64_t item);
 
-// Bases, in bases.cpp.
+/// \throws Unsound, unless `sound`.
+void demand(bool sound, const char* what);
+/// A file for the readers of paths; nothing of it is synced, as write_file() would.
+std::filesystem::path in_file(const std::string& bytes, const std::filesystem::path& folder,
+                              const char* name);
+
+// Readers of solid_formats.cpp.
+
+void read_vdb_bytes(const std::string& bytes, const std::filesystem::path& folder);
+void read_tiles_bytes(const std::string& bytes, const std::filesystem::path& folder);
+void read_recipe_bytes(const std::string& bytes, const std::filesystem::path& folder);
+
+// Bases, in bases.cpp; those of solids in solid_bases.cpp.
 
 std::vector<std::string> obj_bases();
 std::vector<std::string> ply_bases();

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include "stats/core/text.h"
+#include "tests/stats/io/annotation_makers.h"
 #include "tests/support/command.h"
 
 namespace taihu {
@@ -48,14 +49,13 @@ TEST(Hostile, ALongOrForeignNameStaysOnOneLine) {
 
 TEST(Hostile, AVerbThatRefusesSaysNothingBefore) {
     const Scratch scratch;
-    must("taihu shape box -o a.ply", scratch);
-    // It closes the mesh and says so, and then finds no holes.
-    write_file(scratch / "none.csv", "x_m,y_m,z_m,radius_m\n");
     write_file(scratch / "open.obj",
                "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 1 4 3\n");
+    write_file(scratch / "all.csv", "x_m,y_m,z_m,radius_m\n0,0,0,9\n");
+    // That the mesh was closed is said when it is voxelized, but not when carving leaves nothing.
     EXPECT_THAT(run("taihu voxelize open.obj --dim 16 -o a.vdb", scratch.path()).err,
                 HasSubstr("open.obj: "));
-    refusal("taihu carve open.obj --dim 16 --holes missing.csv -o b.vdb", 1, scratch);
+    refusal("taihu carve open.obj --dim 16 --holes all.csv -o b.vdb", 1, scratch);
 }
 
 TEST(Hostile, InfoTakesNoJsonAtItsWord) {
@@ -63,7 +63,7 @@ TEST(Hostile, InfoTakesNoJsonAtItsWord) {
     write_file(scratch / "deep.json",
                "{\"taihu_report\": 1, \"levels\": " + std::string(1'000'000, '[') + "}");
     EXPECT_THAT(refusal("taihu info deep.json", 1, scratch),
-                HasSubstr("deep.json:1:97: nested deeper than 64 levels"));
+                HasSubstr("deep.json:1:94: nested deeper than 64 levels"));
     write_file(scratch / "twice.json", R"({"taihu_report": 1, "taihu_report": 1})");
     EXPECT_THAT(refusal("taihu info twice.json", 1, scratch), HasSubstr("is there twice"));
     write_file(scratch / "recipe.json", R"({"taihu_report": 1, "recipe": 5})");
@@ -87,6 +87,9 @@ TEST(Hostile, PipesAndDevicesAreNotRead) {
     write_file(scratch / "a.obj", "mtllib pipe.ply\nmtllib ../../../etc/passwd\nv 0 0 0\nv 1 0 0\n"
                                   "v 0 1 0\nf 1 2 3\n");
     must("timeout 10 taihu info a.obj", scratch);
+    // Nor the photo that marks were made on.
+    write_file(scratch / "marks.json", labelme_text(eight_holes(), "pipe.ply"));
+    must("timeout 10 taihu fit marks.json -o law.json", scratch);
 }
 
 } // namespace
