@@ -1,11 +1,9 @@
 // A libFuzzer target of one format, TAIHU_FUZZ_FORMAT.
 #include <cstdint>
 #include <cstdlib>
-#include <fstream>
 
 #include "stats/core/error.h"
 #include "tests/fuzz/formats.h"
-#include "tests/support/mutate.h"
 #include "tests/support/scratch.h"
 
 namespace {
