@@ -392,9 +392,12 @@ std::unique_ptr<RecipeNode> parse_node(const json& node, const std::string& wher
     } catch (const Error& e) { // what would be an argument's fault is the file's here
         if (e.fault() != Fault::bad_argument)
             throw;
-        const std::string_view what = e.what();
-        throw Error(Fault::bad_input,
-                    what.starts_with(inside) ? e.what() : inside + ": " + e.what());
+        std::string what = e.what();
+        if (!what.starts_with(inside))
+            what = inside + ": " + what;
+        if (what.find(';') == std::string::npos)
+            what += "; correct it";
+        throw Error(Fault::bad_input, what);
     }
     std::vector<std::string_view> known;
     for (const auto& [name, parse] : kNodes)

@@ -49,7 +49,7 @@ std::uint64_t seed_of(const json& recipe, const std::string& where,
         return 0;
     json_number(recipe, where, "seed", 0, kMostSeed);
     if (!recipe["seed"].is_number_unsigned())
-        throw Error(Fault::bad_input, where + ": 'seed' must be a whole number");
+        throw Error(Fault::bad_input, where + ": 'seed' must be a whole number; correct it");
     return recipe["seed"].get<std::uint64_t>();
 }
 

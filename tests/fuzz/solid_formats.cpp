@@ -50,12 +50,10 @@ public:
 } // namespace
 
 void read_recipe_bytes(const std::string& bytes, const fs::path& folder) {
-    static const fs::path files = [&] {
+    if (!fs::exists(folder / "holes.csv"))
         write_recipe_files(folder);
-        return folder;
-    }();
     const RecipeAssets assets{
-        {files},
+        {folder},
         [](const fs::path& file, double unit_m, bool z_up) {
             return read_mesh(file, {unit_m, z_up ? UpAxis::z : UpAxis::y}).levels.front();
         },
