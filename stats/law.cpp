@@ -103,9 +103,12 @@ std::string_view family_name(Family family) {
 
 Family family_from_name(std::string_view name) {
     const auto found = std::find(kFamilies.begin(), kFamilies.end(), name);
-    if (found == kFamilies.end())
-        throw Error(Fault::bad_argument, "law: unknown family '" + printable(name) + "'" +
-                                             did_you_mean(name, kFamilies));
+    if (found == kFamilies.end()) {
+        const std::string nearest = did_you_mean(name, kFamilies);
+        throw Error(Fault::bad_argument,
+                    "law: unknown family '" + printable(name) + "'" +
+                        (nearest.empty() ? "; use one such as exponential or gamma" : nearest));
+    }
     return static_cast<Family>(found - kFamilies.begin());
 }
 

@@ -122,8 +122,13 @@ CLI::App* Console::verb(CLI::App& app, const std::string& name, const std::strin
 
 void Console::say_text(const std::string& line) const {
     if (!quiet)
-        std::fprintf(stderr, "%s%s\n", ::isatty(STDERR_FILENO) ? "\r\033[K" : "",
-                     printable(line, 4096).c_str());
+        said_.push_back(printable(line, 4096));
+}
+
+void Console::show_said() const {
+    for (const std::string& line : said_)
+        std::fprintf(stderr, "%s%s\n", ::isatty(STDERR_FILENO) ? "\r\033[K" : "", line.c_str());
+    said_.clear();
 }
 
 void Console::say_all(const std::string& where, const std::vector<std::string>& lines) const {

@@ -56,12 +56,15 @@ struct Console {
         tbb::task_arena(n_threads).execute(run);
     }
 
-    /// A line for people, unless -q.
+    /// A line for people, unless -q; held until show_said(), so that a verb which refuses says
+    /// nothing but why.
     template <class... Args>
     void say(fmt::format_string<Args...> format, Args&&... args) const {
         say_text(fmt::format(format, std::forward<Args>(args)...));
     }
     void say_text(const std::string& line) const;
+    /// Prints what was said since the last time.
+    void show_said() const;
     /// Findings about `where`, one line each.
     void say_all(const std::string& where, const std::vector<std::string>& lines) const;
     /// The machine's result: with --json one object on stdout.
@@ -74,6 +77,9 @@ struct Console {
                    std::initializer_list<std::filesystem::path> others = {}) const;
     /// The same of a folder for tiles, which may be there already.
     void may_write_tiles(const std::filesystem::path& folder) const;
+
+private:
+    mutable std::vector<std::string> said_;
 };
 
 /// Exit code of a verb whose answer is no.

@@ -3,6 +3,7 @@
 #include "stats/core/file.h"
 #include "stats/core/text.h"
 #include "stats/io/holes_file.h"
+#include "stats/io/json_detail.h"
 #include "stats/io/law_file.h"
 #include "stats/io/measurements.h"
 #include "tools/solid_files.h"
@@ -16,13 +17,16 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
+constexpr std::size_t kMostJsonBytes = std::size_t{16} << 20,
+                      kMostTableBytes = std::size_t{1} << 30;
+
 Json vdb_info(const std::filesystem::path& path) {
     const VdbFile file = read_vdb(path);
     const Lattice lattice = lattice_of(*file.solid);
     const openvdb::CoordBBox box = file.solid->evalActiveVoxelBoundingBox();
     Json json = {{"kind", file.tile.empty() ? "level set" : "tile of a level set"}};
     if (!file.tile.empty())
-        json["tile"] = Json::parse(file.tile, nullptr, false);
+        json["tile"] = parse_ordered_json(file.tile, base_name(path) + ": taihu_tile");
     json.update({{"voxel_m", lattice.voxel_m},
                  {"half_width_vox", lattice.half_width_vox},
                  {"voxels", {box.dim().x(), box.dim().y(), box.dim().z()}},
@@ -56,7 +60,8 @@ Json mesh_info(const SolidOptions& options, const Console& console) {
 
 /// A law or a report as it stands in its file, or what a list of tiles comes to.
 Json json_info(const std::filesystem::path& path) {
-    const Json text = Json::parse(read_file(path, std::size_t{16} << 20), nullptr, false);
+    const Json text =
+        parse_ordered_json(read_file(path, kMostJsonBytes), base_name(path), kMostJsonBytes);
     if (text.is_object() && text.contains("taihu_report")) {
         Json json = {{"kind", "report of levels of detail"}};
         json.update(text);
@@ -84,7 +89,7 @@ Json json_info(const std::filesystem::path& path) {
 }
 
 Json table_info(const std::filesystem::path& path) {
-    if (read_file(path).find("x_m") == std::string::npos) {
+    if (read_file(path, kMostTableBytes).find("x_m") == std::string::npos) {
         const Measurements m = read_measurements(std::span(&path, 1));
         return {{"kind", "hole diameters measured on pictures"},
                 {"profiles", n_profiles(m.sample)},
@@ -120,7 +125,7 @@ void run(const SolidOptions& options, const Console& console) {
         throw Error(Fault::unsupported,
                     options.path.string() + ": unknown extension '" + extension +
                         "'; use .vdb, .obj, .ply, .stl, .off, .glb, .drc, .json or .csv");
-    if (json.contains("recipe")) { // text in the file, an object for people and programs
+    if (json.contains("recipe") && json["recipe"].is_string()) { // text in the file, an object for people and programs
         const std::string text = json["recipe"].get<std::string>();
         json["recipe"] = recipe_solid(text) ? Json::parse(text) : Json(nullptr);
     }

@@ -20,7 +20,7 @@ namespace {
 enum Exit { kDone = 0, kFailed = 1, kUsage = 2, kBug = 70, kSignalled = 128 };
 
 int fail(int code, const std::string& message) {
-    std::fprintf(stderr, "taihu: %s\n", printable(message, 1000).c_str());
+    std::fprintf(stderr, "%s\n", error_line(message).c_str());
     return code;
 }
 
@@ -85,6 +85,21 @@ std::optional<std::string> unknown_option(const CLI::App& app, int argc, char** 
     return std::nullopt;
 }
 
+/// Every number that was given is finite: CLI11 reads nan, which is in all its ranges.
+void check_numbers(const CLI::App& verb) {
+    for (const CLI::Option* option : verb.get_options()) {
+        const std::string type = option->get_type_name();
+        if (!type.starts_with("FLOAT") && !type.starts_with("INT") && !type.starts_with("UINT"))
+            continue;
+        for (const std::string& text : option->reduced_results())
+            if (const auto value = parse_number(text); !value)
+                throw Error(Fault::bad_argument,
+                            verb.get_name() + ": " + option->get_name() + " is '" +
+                                printable(text) + "', must be a finite number" +
+                                type.substr(std::min(type.find(" in "), type.size())));
+    }
+}
+
 /// CLI11's own complaints, as one line of ours.
 int usage_error(const CLI::App& app, int argc, char** argv, const CLI::ParseError& error) {
     if (const auto unknown = unknown_option(app, argc, argv))
@@ -117,10 +132,11 @@ int run(int argc, char** argv) {
     std::optional<TerminalProgress> progress;
     // Between parsing and the verb's callback, options are known: set up what they ask for.
     for (CLI::App* verb : app.get_subcommands(nullptr))
-        verb->parse_complete_callback([&] {
+        verb->parse_complete_callback([&, verb] {
             progress.emplace(!console.quiet && ::isatty(STDERR_FILENO));
             console.progress = &*progress;
             openvdb::initialize();
+            check_numbers(*verb);
         });
     try {
         app.parse(argc, argv);
@@ -129,6 +145,8 @@ int run(int argc, char** argv) {
     } catch (const CLI::CallForVersion& e) {
         return app.exit(e);
     } catch (const CLI::RuntimeError& e) { // a verb's own exit code, such as check's 3
+        progress.reset();
+        console.show_said();
         return e.get_exit_code();
     } catch (const CLI::ParseError& e) {
         return usage_error(app, argc, argv, e);
@@ -143,6 +161,8 @@ int run(int argc, char** argv) {
         claim_the_end();
         return fail_foreign(e);
     }
+    progress.reset();
+    console.show_said();
     return kDone;
 }
 

@@ -52,7 +52,8 @@ Source source_of(const RockArgs& args, const Console& console) {
     if (!args.preset.empty())
         return {preset_recipe(args.preset), "preset " + args.preset, args.assets};
     const std::filesystem::path& file = args.recipe.empty() ? args.from : args.recipe;
-    source.text = args.recipe.empty() ? carried_recipe(file, console) : read_file(file);
+    source.text = args.recipe.empty() ? carried_recipe(file, console)
+                                      : read_file(file, std::size_t{16} << 20);
     source.where = base_name(file);
     source.folders = {file.has_parent_path() ? file.parent_path() : "."};
     source.folders.insert(source.folders.end(), args.assets.begin(), args.assets.end());

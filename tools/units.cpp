@@ -2,6 +2,7 @@
 
 #include <array>
 #include <cctype>
+#include <cmath>
 #include <utility>
 #include <vector>
 
@@ -9,6 +10,18 @@
 #include "stats/core/text.h"
 
 namespace taihu {
+namespace {
+
+constexpr double kLeast = 1e-9, kMost_m = 1e6; // as recipes have them
+constexpr double kMostRelative = 1e9, kMost_deg = 1e6;
+
+[[noreturn]] void refuse_range(const std::string& option, const std::string& text,
+                               const char* range) {
+    throw Error(Fault::bad_argument,
+                option + ": '" + printable(text) + "' is out of range; give " + range);
+}
+
+} // namespace
 
 Length parse_length(const std::string& option, const std::string& text) {
     std::size_t end = text.size();
@@ -21,12 +34,16 @@ Length parse_length(const std::string& option, const std::string& text) {
         {{"", 1}, {"m", 1}, {"cm", 1e-2}, {"mm", 1e-3}, {"um", 1e-6}}};
     if (value && *value > 0) {
         for (const auto& [name, metres] : kMetric)
-            if (unit == name)
+            if (unit == name) {
+                if (!(*value * metres >= kLeast && *value * metres <= kMost_m))
+                    refuse_range(option, text, "1e-9m to 1e6m");
                 return {*value * metres, Length::Unit::metre};
-        if (unit == "vox")
-            return {*value, Length::Unit::voxel};
-        if (unit == "%")
-            return {*value, Length::Unit::percent};
+            }
+        if (unit == "vox" || unit == "%") {
+            if (!(*value >= kLeast && *value <= kMostRelative))
+                refuse_range(option, text, "1e-9 to 1e9 voxels or percent");
+            return {*value, unit == "%" ? Length::Unit::percent : Length::Unit::voxel};
+        }
     }
     throw Error(Fault::bad_argument, option + ": '" + printable(text) +
                                          "' is no length > 0; write 0.5m, 12mm, 2vox or 25%");
@@ -52,8 +69,11 @@ double angle_deg(const std::string& option, const std::string& text) {
     std::string_view number = text;
     if (number.ends_with("deg"))
         number.remove_suffix(3);
-    if (const auto value = parse_number(number))
+    if (const auto value = parse_number(number)) {
+        if (!(std::abs(*value) <= kMost_deg))
+            refuse_range(option, text, "-1e6deg to 1e6deg");
         return *value;
+    }
     throw Error(Fault::bad_argument,
                 option + ": '" + printable(text) + "' is no angle; write 25deg");
 }

@@ -19,7 +19,8 @@ struct Measure {
 };
 
 /// \param option  its name, for messages.
-/// \throws Error bad_argument: no number, an unknown unit, not > 0.
+/// \throws Error bad_argument: no number, an unknown unit, not > 0, not in 1e-9..1e6 m or 1e-9..1e9
+/// voxels or percent.
 Length parse_length(const std::string& option, const std::string& text);
 
 /// \throws Error bad_argument: a relative length where nothing is there to refer to.
@@ -28,7 +29,7 @@ double in_metres(const std::string& option, const Length& length, const Measure&
 /// parse_length and in_metres in one.
 double length_m(const std::string& option, const std::string& text, const Measure& of = {});
 
-/// An angle as people type it [deg]: `25deg`, or `25`.
+/// An angle as people type it [deg]: `25deg`, or `25`; -1e6..1e6.
 /// \throws Error bad_argument: no number, another unit.
 double angle_deg(const std::string& option, const std::string& text);
 

@@ -10,6 +10,7 @@
 
 #include "stats/core/error.h"
 #include "stats/core/file.h"
+#include "stats/core/folder_file.h"
 #include "stats/core/rng.h"
 #include "stats/core/sha256.h"
 #include "stats/core/text.h"
@@ -28,6 +29,13 @@ using Node = std::unique_ptr<RecipeNode>;
 constexpr std::uint32_t kSeedStream = 0x72637065;
 constexpr double kMost_m = kMostLength_m;
 constexpr double kMostSeed = 1.8446744073709551e19;
+
+[[noreturn]] void refuse_unknown(const std::string& where, const char* what,
+                                 const std::string& name, std::span<const std::string_view> known) {
+    const std::string nearest = did_you_mean(name, known);
+    refuse(where, "unknown " + std::string(what) + " '" + printable(name) + "'" +
+                      (nearest.empty() ? "; use one of the recipe's schema" : nearest));
+}
 
 FractalSettings fractal_of(const Keys& keys) {
     FractalSettings f;
@@ -229,7 +237,7 @@ Pattern parse_pattern(const json& pattern, const std::string& where) {
     }
     static constexpr std::string_view kKinds[] = {"thomas", "matern", "joints", "hard_core",
                                                   "lattice"};
-    refuse(where, "unknown pattern '" + printable(kind) + "'" + did_you_mean(kind, kKinds));
+    refuse_unknown(where, "pattern", kind, kKinds);
 }
 
 Box parse_box(const Keys& keys) {
@@ -290,7 +298,8 @@ Node parse_material(const json& body, const std::string& where, RecipeParser& pa
     const Keys keys(body, where, {});
     if (!parser.material)
         refuse(where, "the recipe has no 'material'; add one beside 'solid'");
-    return parse_holes(*parser.material, "material", parser);
+    return parse_holes(*parser.material, where.substr(0, where.find(": solid")) + ": material",
+                       parser);
 }
 
 constexpr std::pair<std::string_view, Parse> kNodes[] = {
@@ -335,15 +344,14 @@ std::vector<Node> parse_children(const Keys& keys, RecipeParser& parser, std::si
 
 std::filesystem::path file_of(const Keys& keys, const char* key, const RecipeParser& parser) {
     const std::string name = keys.text(key), sha256 = keys.text("sha256");
-    if (name.empty() || name != base_name(name) || name == "." || name == "..")
+    if (!is_plain_name(name))
         refuse(keys.where(), "'" + std::string(key) + "' is '" + printable(name) +
                                  "'; must be a name without folders");
     for (const std::filesystem::path& folder : parser.assets.folders) {
-        const std::filesystem::path path = folder / name;
-        std::error_code ignored;
-        if (!std::filesystem::is_regular_file(path, ignored))
+        const auto path = file_in(folder, name);
+        if (!path)
             continue;
-        const std::string found = sha256_hex(read_file(path));
+        const std::string found = sha256_hex(read_file(*path));
         if (found != sha256)
             refuse(keys.where(), "'" + name +
                                      "' is another file than the one the recipe means "
@@ -352,7 +360,7 @@ std::filesystem::path file_of(const Keys& keys, const char* key, const RecipePar
                                      printable(sha256.substr(0, 8)) +
                                      "); find that one, or correct "
                                      "sha256");
-        return path;
+        return *path;
     }
     throw Error(Fault::io, keys.where() + ": there is no file '" + name +
                                "' beside the recipe; put it there, or name its folder (--assets)");
@@ -374,19 +382,29 @@ std::unique_ptr<RecipeNode> parse_node(const json& node, const std::string& wher
     const std::string kind = node.begin().key();
     const json& body = node.begin().value();
     const std::string inside = where + "." + printable(kind);
-    for (const auto& [name, parse] : kNodes)
-        if (name == kind)
-            return parse(body, inside, parser);
+    try {
+        for (const auto& [name, parse] : kNodes)
+            if (name == kind)
+                return parse(body, inside, parser);
+        for (int i = 0; i <= static_cast<int>(ShapeKind::fractal_rock); ++i)
+            if (const auto shape = static_cast<ShapeKind>(i); shape_name(shape) == kind)
+                return parse_shape(shape, body, inside, parser);
+    } catch (const Error& e) { // what would be an argument's fault is the file's here
+        if (e.fault() != Fault::bad_argument)
+            throw;
+        std::string what = e.what();
+        if (!what.starts_with(inside))
+            what = inside + ": " + what;
+        if (what.find(';') == std::string::npos)
+            what += "; correct it";
+        throw Error(Fault::bad_input, what);
+    }
     std::vector<std::string_view> known;
     for (const auto& [name, parse] : kNodes)
         known.push_back(name);
-    for (int i = 0; i <= static_cast<int>(ShapeKind::fractal_rock); ++i) {
-        const auto shape = static_cast<ShapeKind>(i);
-        if (shape_name(shape) == kind)
-            return parse_shape(shape, body, inside, parser);
-        known.push_back(shape_name(shape));
-    }
-    refuse(where, "unknown kind '" + printable(kind) + "'" + did_you_mean(kind, known));
+    for (int i = 0; i <= static_cast<int>(ShapeKind::fractal_rock); ++i)
+        known.push_back(shape_name(static_cast<ShapeKind>(i)));
+    refuse_unknown(where, "kind", kind, known);
 }
 
 } // namespace taihu

@@ -7,6 +7,7 @@
 #include "stats/core/error.h"
 #include "stats/core/text.h"
 #include "stats/io/json_detail.h"
+#include "stats/io/utf_detail.h"
 #include "stats/number_detail.h"
 #include "vdb_ops/rasterize.h"
 #include "vdb_ops/recipe_parse_detail.h"
@@ -19,14 +20,14 @@ using nlohmann::json;
 using nlohmann::ordered_json;
 
 constexpr int kVersion = 1, kDefaultDim = 256, kCoarseDim = 128;
-constexpr std::size_t kMostLevels = 8;
+constexpr std::size_t kMostLevels = 8, kMostBytes = std::size_t{16} << 20;
 constexpr double kMostSeed = 1.8446744073709551e19;
 constexpr std::string_view kRequired[] = {"taihu_recipe", "solid"};
 constexpr std::string_view kOptional[] = {"seed", "voxel_m", "dim", "material",
                                           "lod",  "about",   "set"};
 
 json read_recipe(const std::string& text, const std::string& where) {
-    json recipe = parse_json(text, where);
+    json recipe = parse_json(text, where, kMostBytes);
     if (!recipe.is_object() || !recipe.contains("taihu_recipe"))
         throw Error(Fault::bad_input,
                     where + ": no recipe; a recipe is an object with 'taihu_recipe' and 'solid'");
@@ -48,7 +49,7 @@ std::uint64_t seed_of(const json& recipe, const std::string& where,
         return 0;
     json_number(recipe, where, "seed", 0, kMostSeed);
     if (!recipe["seed"].is_number_unsigned())
-        throw Error(Fault::bad_input, where + ": 'seed' must be a whole number");
+        throw Error(Fault::bad_input, where + ": 'seed' must be a whole number; correct it");
     return recipe["seed"].get<std::uint64_t>();
 }
 
@@ -146,7 +147,7 @@ std::optional<RecipeLod> lod_of(const json& recipe, const std::string& where, do
     if (own.contains("origin")) {
         const std::string origin = json_text(own, inside, "origin");
         if (origin != "foot" && origin != "world")
-            throw Error(Fault::bad_input, inside + ": 'origin' must be foot or world");
+            throw Error(Fault::bad_input, inside + ": 'origin' must be foot or world; correct it");
         lod.at_foot = origin == "foot";
     }
     if (own.contains("maps")) {
@@ -331,9 +332,16 @@ std::string with_setting(const std::string& recipe, const std::string& where,
                                                  "'" + did_you_mean(key, views));
         path = names.contains(key) ? names[key].get<std::string>() : "/" + key;
     }
-    ordered_json parsed = ordered_json::parse(value, nullptr, false);
-    if (parsed.is_discarded())
+    ordered_json parsed;
+    try {
+        parsed = parse_ordered_json(value, where);
+    } catch (const Error&) { // no JSON, or none of ours: a text
+        if (!is_utf8(value))
+            throw Error(Fault::bad_argument, where + ": '" + printable(key) + "' is '" +
+                                                 printable(value) +
+                                                 "', which is not UTF-8; write it as UTF-8");
         parsed = value;
+    }
     try {
         const ordered_json::json_pointer pointer(path);
         if (!text.contains(pointer) && path.find('/', 1) != std::string::npos)

@@ -8,6 +8,7 @@
 #include "stats/core/error.h"
 #include "stats/core/file.h"
 #include "stats/core/file_set.h"
+#include "stats/core/folder_file.h"
 #include "stats/core/sha256.h"
 #include "stats/core/temporary_detail.h"
 #include "stats/core/text.h"
@@ -29,7 +30,7 @@ using TopNode = openvdb::FloatTree::RootNodeType::ChildNodeType;
 using Node = TopNode::ChildNodeType;
 
 constexpr int kVersion = 1;
-constexpr double kMostVoxel = 0x1p31;
+constexpr double kMostVoxel = 0x1p30;
 
 ordered_json box_json(const CoordBBox& box) {
     return {{box.min().x(), box.min().y(), box.min().z()},
@@ -39,15 +40,19 @@ ordered_json box_json(const CoordBBox& box) {
 CoordBBox box_of(const json& box, const std::string& where) {
     Coord corners[2];
     if (!box.is_array() || box.size() != 2)
-        throw Error(Fault::bad_input, where + ": 'box' must be two corners");
+        throw Error(Fault::bad_input, where + ": 'box' must be two corners; correct it");
     for (std::size_t c = 0; c < 2; ++c)
         for (std::size_t axis = 0; axis < 3; ++axis) {
             if (!box[c].is_array() || box[c].size() != 3 || !box[c][axis].is_number_integer() ||
                 std::fabs(box[c][axis].get<double>()) > kMostVoxel)
                 throw Error(Fault::bad_input, where + ": 'box' must be two corners of three whole "
-                                                      "numbers each");
+                                                      "numbers each; correct it");
             corners[c][static_cast<int>(axis)] = box[c][axis].get<int>();
         }
+    if (!(corners[0][0] <= corners[1][0] && corners[0][1] <= corners[1][1] &&
+          corners[0][2] <= corners[1][2]))
+        throw Error(Fault::bad_input,
+                    where + ": 'box' has its corners in the wrong order; give the lower one first");
     return {corners[0], corners[1]};
 }
 
@@ -205,10 +210,9 @@ Tile tile_of(const json& entry, const std::string& where) {
     check_keys(entry, where, kKeys);
     Tile tile;
     tile.file = json_text(entry, where, "file");
-    if (tile.file.empty() || tile.file != fs::path(tile.file).filename().string() ||
-        !tile.file.ends_with(".vdb"))
+    if (!is_plain_name(tile.file) || !tile.file.ends_with(".vdb"))
         throw Error(Fault::bad_input, where + ": 'file' is '" + printable(tile.file) +
-                                          "', must be the base name of a .vdb");
+                                          "', must be the base name of a .vdb; correct it");
     tile.box = box_of(entry["box"], where);
     tile.n_leaves = static_cast<std::size_t>(json_number(entry, where, "leaves", 0, 1e15));
     tile.n_bytes = static_cast<std::size_t>(json_number(entry, where, "bytes", 0, 1e15));
@@ -248,7 +252,9 @@ TileSet read_tile_set(const fs::path& path) {
     static constexpr std::string_view kKeys[] = {
         "taihu_tiles", "voxel_m", "origin_m", "half_width_vox", "tile_voxels", "recipe", "tiles"};
     const std::string where = base_name(path);
-    const json text = parse_json(read_file(path), where, std::size_t{1} << 30);
+    constexpr std::size_t kMostBytes = std::size_t{1} << 30;
+    const std::string bytes = read_file(path, kMostBytes);
+    const json text = parse_json(bytes, where, kMostBytes);
     check_keys(text, where, kKeys);
     if (text["taihu_tiles"] != kVersion)
         throw Error(Fault::bad_input, where + ": 'taihu_tiles' is " +
@@ -262,16 +268,16 @@ TileSet read_tile_set(const fs::path& path) {
         static_cast<int>(json_number(text, where, "tile_voxels", kLeastTile, kMostTile));
     const json& origin = text["origin_m"];
     if (!origin.is_array() || origin.size() != 3)
-        throw Error(Fault::bad_input, where + ": 'origin_m' must be three numbers");
+        throw Error(Fault::bad_input, where + ": 'origin_m' must be three numbers; correct it");
     for (std::size_t axis = 0; axis < 3; ++axis) {
         if (!origin[axis].is_number())
-            throw Error(Fault::bad_input, where + ": 'origin_m' must be three numbers");
+            throw Error(Fault::bad_input, where + ": 'origin_m' must be three numbers; correct it");
         set.lattice.origin[static_cast<int>(axis)] = origin[axis].get<double>();
     }
     if (!text["recipe"].is_null())
-        set.recipe = ordered_json::parse(read_file(path))["recipe"].dump();
+        set.recipe = ordered_json::parse(bytes)["recipe"].dump();
     if (!text["tiles"].is_array())
-        throw Error(Fault::bad_input, where + ": 'tiles' must be a list");
+        throw Error(Fault::bad_input, where + ": 'tiles' must be a list; correct it");
     for (std::size_t i = 0; i < text["tiles"].size(); ++i)
         set.tiles.push_back(
             tile_of(text["tiles"][i], where + ": tiles[" + std::to_string(i) + "]"));
@@ -279,11 +285,14 @@ TileSet read_tile_set(const fs::path& path) {
 }
 
 openvdb::FloatGrid::Ptr read_tile(const fs::path& folder, const Tile& tile) {
-    const fs::path path = folder / tile.file;
-    if (sha256_hex(read_file(path)) != tile.sha256)
-        throw Error(Fault::bad_input, path.string() + ": another file than the one that " +
+    const auto path = file_in(folder, tile.file);
+    if (!path)
+        throw Error(Fault::io, (folder / tile.file).string() +
+                                   ": there is no such file; put the tile beside " + kTileSetName);
+    if (sha256_hex(read_file(*path)) != tile.sha256)
+        throw Error(Fault::bad_input, path->string() + ": another file than the one that " +
                                           kTileSetName + " means; write the tiles again");
-    return read_vdb(path).solid;
+    return read_vdb(*path).solid;
 }
 
 VdbFile read_solid_vdb(const fs::path& path, Progress* progress) {
@@ -313,7 +322,8 @@ openvdb::FloatGrid::Ptr read_tiles(const fs::path& set_path, Progress* progress)
         check_cancelled(progress);
         const auto grid = read_tile(set_path.parent_path(), t);
         if (lattice_of(*grid).half_width_vox != lattice_of(*whole).half_width_vox)
-            throw Error(Fault::bad_input, t.file + ": has another half band than the set");
+            throw Error(Fault::bad_input,
+                        t.file + ": has another half band than the set; write the tiles again");
         // Tiles are whole nodes of 128^3, so nodes change hands and nothing is merged.
         std::vector<Coord> origins;
         for (auto top = grid->tree().root().beginChildOn(); top; ++top)
@@ -323,7 +333,8 @@ openvdb::FloatGrid::Ptr read_tiles(const fs::path& set_path, Progress* progress)
                 if (!child && top->getTable()[i].getValue() > 0)
                     continue;
                 if (!t.box.isInside(at))
-                    throw Error(Fault::bad_input, t.file + ": reaches beyond its box");
+                    throw Error(Fault::bad_input,
+                                t.file + ": reaches beyond its box; write the tiles again");
                 if (!root.probeNode<TopNode>(at))
                     root.addChild(new TopNode(at, whole->background(), false));
                 auto* to = root.probeNode<TopNode>(at);

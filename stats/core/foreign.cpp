@@ -264,6 +264,9 @@ int serve_foreign(int argc, char** argv, const std::map<std::string, ForeignRead
         return 2;
     }
     ::prctl(PR_SET_PDEATHSIG, SIGKILL, 0, 0, 0);
+    // What libraries say on standard output is not part of the answer.
+    const Handle out(::dup(STDOUT_FILENO));
+    ::dup2(STDERR_FILENO, STDOUT_FILENO);
     FlatWriter answer;
     const auto refuse = [&](Fault fault, const std::string& message) {
         answer.bytes.clear();
@@ -287,7 +290,7 @@ int serve_foreign(int argc, char** argv, const std::map<std::string, ForeignRead
                where + ": damaged (" + printable(e.what(), kMostText) + "); write the file again");
     }
     try {
-        write_all(STDOUT_FILENO, answer.bytes, where);
+        write_all(out.get(), answer.bytes, where);
     } catch (const Error&) {
         return 1;
     }

@@ -34,6 +34,9 @@ std::string_view trimmed(std::string_view text) {
 }
 
 std::string did_you_mean(std::string_view name, std::span<const std::string_view> known) {
+    constexpr std::size_t kLongestName = 256; // a key of a foreign file may have megabytes
+    if (name.size() > kLongestName)
+        return {};
     std::string_view nearest;
     std::size_t best = std::max<std::size_t>(2, name.size() / 3) + 1; // farther is no likely typo
     for (const std::string_view candidate : known) {
@@ -64,15 +67,31 @@ std::size_t utf8_length(std::string_view text, std::size_t at) {
         return i < text.size() ? static_cast<unsigned char>(text[i]) : 0u;
     };
     const unsigned first = byte(at);
-    const std::size_t n = first < 0x80       ? 1
-                          : first >> 5 == 6  ? 2
-                          : first >> 4 == 14 ? 3
-                          : first >> 3 == 30 ? 4
-                                             : 0;
+    const bool overlong = first == 0xc0 || first == 0xc1,
+               control = first == 0xc2 && byte(at + 1) < 0xa0;
+    const std::size_t n = first < 0x80          ? 1
+                          : overlong || control ? 0
+                          : first >> 5 == 6     ? 2
+                          : first >> 4 == 14    ? 3
+                          : first >> 3 == 30    ? 4
+                                                : 0;
     for (std::size_t k = 1; k < n; ++k)
         if (byte(at + k) >> 6 != 2)
             return 0;
     return n;
+}
+
+/// `text` with its middle replaced by dots: at most `head` bytes before them, `tail` behind.
+std::string without_middle(std::string_view text, std::size_t head, std::size_t tail) {
+    const auto continues = [&](std::size_t at) {
+        return (static_cast<unsigned char>(text[at]) & 0xc0) == 0x80;
+    };
+    std::size_t behind = text.size() - tail;
+    while (head > 0 && continues(head))
+        --head;
+    while (behind < text.size() && continues(behind))
+        ++behind;
+    return std::string(text.substr(0, head)) + "..." + std::string(text.substr(behind));
 }
 
 } // namespace
@@ -97,6 +116,23 @@ std::string printable(std::string_view text, std::size_t max_length) {
     if (text.size() > max_length)
         out += "...";
     return out;
+}
+
+std::string error_line(std::string_view message) {
+    constexpr std::size_t kLongestWord = 72, kHead = 170;
+    const std::string whole = printable(message, message.size());
+    std::string line = "taihu: ";
+    const bool too_long = line.size() + whole.size() > kMostErrorBytes;
+    for (std::size_t at = 0; at < whole.size();) {
+        const std::size_t end = std::min(whole.find(' ', at), whole.size() - 1) + 1;
+        const std::string_view word = std::string_view(whole).substr(at, end - at);
+        line += too_long && word.size() > kLongestWord ? without_middle(word, 20, kLongestWord - 23)
+                                                       : std::string(word);
+        at = end;
+    }
+    if (line.size() > kMostErrorBytes)
+        line = without_middle(line, kHead, kMostErrorBytes - kHead - 3);
+    return line;
 }
 
 } // namespace taihu

@@ -112,16 +112,26 @@ json parse_json(std::string_view text, std::string_view where, std::size_t max_b
     }
 }
 
+nlohmann::ordered_json parse_ordered_json(std::string_view text, std::string_view where,
+                                          std::size_t max_bytes, std::size_t max_depth) {
+    parse_json(text, where, max_bytes, max_depth); // refuses what the other parser would let pass
+    return nlohmann::ordered_json::parse(text.begin(), text.end());
+}
+
 void check_keys(const json& object, const std::string& where,
                 std::span<const std::string_view> required,
                 std::span<const std::string_view> optional) {
     if (!object.is_object())
-        refuse(where, "is " + std::string(object.type_name()) + ", must be an object");
+        refuse(where, "is " + std::string(object.type_name()) + ", must be an object; correct it");
     std::vector<std::string_view> known(required.begin(), required.end());
     known.insert(known.end(), optional.begin(), optional.end());
-    for (const auto& [key, value] : object.items())
-        if (std::find(known.begin(), known.end(), key) == known.end())
-            refuse(where, "unknown key '" + printable(key) + "'" + did_you_mean(key, known));
+    for (const auto& [key, value] : object.items()) {
+        if (std::find(known.begin(), known.end(), key) != known.end())
+            continue;
+        const std::string nearest = did_you_mean(key, known);
+        refuse(where, "unknown key '" + printable(key) + "'" +
+                          (nearest.empty() ? "; drop it" : nearest));
+    }
     for (const std::string_view key : required)
         if (!object.contains(key))
             refuse(where, "key '" + std::string(key) + "' is missing; add it");
@@ -133,11 +143,11 @@ double json_number(const json& object, const std::string& where, std::string_vie
     if (found == object.end() || !found->is_number())
         refuse(where, "'" + std::string(key) + "' is " +
                           (found == object.end() ? "missing" : found->type_name()) +
-                          ", must be a number");
+                          ", must be a number; correct it");
     const double value = found->get<double>();
     if (!(value >= lo && value <= hi))
         refuse(where, "'" + std::string(key) + "' is " + shortest(value) + ", must be in " +
-                          shortest(lo) + ".." + shortest(hi));
+                          shortest(lo) + ".." + shortest(hi) + "; correct it");
     return value;
 }
 
@@ -146,7 +156,7 @@ std::string json_text(const json& object, const std::string& where, std::string_
     if (found == object.end() || !found->is_string())
         refuse(where, "'" + std::string(key) + "' is " +
                           (found == object.end() ? "missing" : found->type_name()) +
-                          ", must be a string");
+                          ", must be a string; correct it");
     return found->get<std::string>();
 }
 

@@ -18,6 +18,11 @@ nlohmann::json parse_json(std::string_view text, std::string_view where,
                           std::size_t max_bytes = std::size_t{64} << 20,
                           std::size_t max_depth = 64);
 
+/// The same with the keys in their order.
+nlohmann::ordered_json parse_ordered_json(std::string_view text, std::string_view where,
+                                          std::size_t max_bytes = std::size_t{64} << 20,
+                                          std::size_t max_depth = 64);
+
 /// Refuses all but an object that has every key of `required` and none but those and `optional`.
 /// \param where  names the object in messages: `law.json: parameters`.
 /// \throws Error bad_input, with the key and the nearest known one.

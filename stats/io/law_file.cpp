@@ -112,13 +112,13 @@ const json& array_at(const json& object, const std::string& where, const char* k
         refuse(where, std::string("'") + key + "' is " +
                           (items.is_array() ? std::to_string(items.size()) + " items"
                                             : std::string(items.type_name())) +
-                          ", must be a list of at most " + std::to_string(most));
+                          ", must be a list of at most " + std::to_string(most) + "; correct it");
     return items;
 }
 
 std::array<double, 2> pair_of_numbers(const json& value, const std::string& where) {
     if (!value.is_array() || value.size() != 2 || !value[0].is_number() || !value[1].is_number())
-        refuse(where, "must be a list of two numbers");
+        refuse(where, "must be a list of two numbers; correct it");
     return {value[0].get<double>(), value[1].get<double>()};
 }
 
@@ -183,7 +183,7 @@ std::vector<Interval> parse_intervals(const json& root, const std::string& where
         const double value = law.parameters()[i];
         if (!(lo <= value && value <= hi))
             refuse(inside, "'" + name + "' is " + list({lo, hi}) + ", which leaves out its value " +
-                               shortest(value));
+                               shortest(value) + "; correct one of them");
         intervals.push_back({lo, hi});
     }
     return intervals;
@@ -312,7 +312,7 @@ LawFile parse_law_file(std::string_view text, const std::string& where) {
     file.detection_limit = optional_number(root, where, "detection_limit", 0, kGreatest);
     const double n = json_number(root, where, "n_profiles", 0, 1e9);
     if (n != std::floor(n))
-        refuse(where, "'n_profiles' is " + shortest(n) + ", must be a whole number");
+        refuse(where, "'n_profiles' is " + shortest(n) + ", must be a whole number; correct it");
     file.n_profiles = static_cast<std::uint64_t>(n);
     file.area = optional_number(root, where, "area", std::numeric_limits<double>::min(), kGreatest);
     file.ranking = parse_ranking(root, where);

@@ -1,6 +1,7 @@
 #include "stats/io/measurement_part_detail.h"
 
 #include <array>
+#include <cmath>
 #include <string_view>
 #include <utility>
 
@@ -114,6 +115,9 @@ void read_comments(const Table& table, Part& part, std::vector<std::string>& war
             if (!value || !(*value > 0))
                 table.refuse_line(comment.line, "'" + key + "' is '" + printable(comment.value) +
                                                     "'; must be a number > 0");
+            if (key == "planes" && !(*value <= 1e9 && *value == std::floor(*value)))
+                table.refuse_line(comment.line, "'planes' is '" + printable(comment.value) +
+                                                    "'; must be a whole number from 1 to 1e9");
             (key == "planes" ? part.planes : part.volume) = value;
         } else if (!key.empty() && !did_you_mean(key, known).empty()) {
             warnings.push_back(part.name + ":" + std::to_string(comment.line) + ": comment '" +

@@ -141,8 +141,9 @@ void scale_to_greatest(Measurements& result) {
                           ? result.segments.size() == sample.diameters.size() || greatest == 1
                           : std::none_of(sample.bins.begin(), sample.bins.end(), past_1);
     if (!fits)
-        throw Error(Fault::bad_input, "measurements: unit is greatest but the greatest diameter is "
-                                      "not 1; divide by it, or say unit=px or m");
+        throw Error(Fault::bad_input, result.sources.back().name +
+                                          ": unit is greatest but the greatest diameter is "
+                                          "not 1; divide by it, or say unit=px or m");
 }
 
 void check_settings(const MeasurementSettings& settings) {

@@ -61,6 +61,8 @@ std::string_view Table::decoded(std::string_view text) {
         text.remove_prefix(3);
     if (!is_utf8(text))
         refuse_line(0, "is not UTF-8 text; save it as UTF-8, in a spreadsheet as 'CSV UTF-8'");
+    if (text.find('\0') != std::string_view::npos)
+        refuse_line(0, "holds zero bytes, so it is no table; save it as CSV (UTF-8)");
     return text;
 }
 
@@ -169,9 +171,13 @@ std::size_t Table::column(std::string_view name) const {
 }
 
 void Table::check_header(std::span<const std::string_view> known) const {
-    for (const std::string_view name : header_)
-        if (std::find(known.begin(), known.end(), name) == known.end())
-            refuse_line(0, "unknown column '" + printable(name) + "'" + did_you_mean(name, known));
+    for (const std::string_view name : header_) {
+        if (std::find(known.begin(), known.end(), name) != known.end())
+            continue;
+        const std::string nearest = did_you_mean(name, known);
+        refuse_line(0, "unknown column '" + printable(name) + "'" +
+                           (nearest.empty() ? "; drop it, or give it a known name" : nearest));
+    }
 }
 
 double Table::number(std::size_t row, std::size_t column) const {

@@ -19,6 +19,11 @@ TEST(Units, LengthsTakeTheUnitsPeopleType) {
 TEST(Units, EverythingElseIsRefusedByName) {
     for (const char* bad : {"", "m", "-1m", "0", "1 m", "1,5m", "2km", "1e999", "nan"})
         expect_error(Fault::bad_argument, "--x: '", [&] { length_m("--x", bad); });
+    for (const char* bad : {"1e308", "1e-30", "1e-320", "2e6m", "1e-4um", "1e308vox", "1e-30%"})
+        expect_error(Fault::bad_argument, "is out of range; give 1e-9", [&] {
+            length_m("--x", bad, {1, 1});
+        });
+    expect_error(Fault::bad_argument, "is out of range", [] { angle_deg("--tilt", "1e308"); });
     expect_error(Fault::bad_argument, "in voxels has nothing", [] { length_m("--x", "2vox"); });
     expect_error(Fault::bad_argument, "in percent has nothing", [] { length_m("--x", "2%"); });
 }

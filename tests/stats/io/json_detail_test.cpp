@@ -92,9 +92,9 @@ TEST(JsonNumber, ChecksKindAndRange) {
         }
         return "accepted";
     };
-    EXPECT_EQ(refusal_of("a"), "a.json: 'a' is 3, must be in 0..2");
-    EXPECT_EQ(refusal_of("b"), "a.json: 'b' is string, must be a number");
-    EXPECT_EQ(refusal_of("c"), "a.json: 'c' is missing, must be a number");
+    EXPECT_EQ(refusal_of("a"), "a.json: 'a' is 3, must be in 0..2; correct it");
+    EXPECT_EQ(refusal_of("b"), "a.json: 'b' is string, must be a number; correct it");
+    EXPECT_EQ(refusal_of("c"), "a.json: 'c' is missing, must be a number; correct it");
     EXPECT_EQ(json_text(object, "a.json", "b"), "3");
     EXPECT_THROW(json_text(object, "a.json", "a"), Error);
 }
