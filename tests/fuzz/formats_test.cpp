@@ -12,6 +12,11 @@
 #include "tests/support/scratch.h"
 
 namespace taihu {
+
+void PrintTo(const FuzzFormat& format, std::ostream* out) {
+    *out << format.name; // or its bytes would be part of the test's name
+}
+
 namespace {
 
 namespace fs = std::filesystem;

@@ -89,7 +89,7 @@ TEST(TileMesh, RefusesTilesThatAreNone) {
     };
     const auto good = nlohmann::json::parse(read_file(set));
     auto bad = good;
-    bad["tiles"][0]["box"][0][0] = 1;
+    bad["tiles"][0]["box"][0][0] = good["tiles"][0]["box"][0][0].get<int>() + 1;
     refused(bad.dump(), "its box is not one of a tile");
     bad = good;
     bad["tiles"][1] = bad["tiles"][0];

@@ -78,7 +78,7 @@ TEST(CheckKeys, NamesTheKey) {
     EXPECT_EQ(refusal_of("{\"shape\": 1, \"scael\": 2}"),
               "a.json: law: unknown key 'scael'; did you mean 'scale'?");
     EXPECT_EQ(refusal_of("{\"shape\": 1}"), "a.json: law: key 'scale' is missing; add it");
-    EXPECT_EQ(refusal_of("[1]"), "a.json: law: is array, must be an object");
+    EXPECT_EQ(refusal_of("[1]"), "a.json: law: is array, must be an object; correct it");
 }
 
 TEST(JsonNumber, ChecksKindAndRange) {
