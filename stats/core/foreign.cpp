@@ -36,6 +36,7 @@ constexpr std::size_t kBytesPerSecond = 10'000'000;
 constexpr int kWait_ms = 50;       ///< between looks at whether to go on
 constexpr double kIdleFactor = 15; ///< seconds on the clock for one of the processor
 constexpr std::size_t kMostText = 200;
+constexpr std::uint64_t kMostFiles = 16; ///< that a reader may have open
 
 /// The first byte of an answer.
 enum class Answer : std::uint8_t { found, refused };
@@ -250,7 +251,8 @@ void limit_self(std::size_t n_bytes) {
     limit(RLIMIT_AS, limits.memory_bytes);
 #endif
     limit(RLIMIT_CPU, limits.processor_s);
-    limit(RLIMIT_FSIZE, limits.memory_bytes); // of the answer: nothing else can be opened
+    limit(RLIMIT_FSIZE, limits.memory_bytes); // of the answer
+    limit(RLIMIT_NOFILE, kMostFiles);
     limit(RLIMIT_CORE, 0);
     ::prctl(PR_SET_NO_NEW_PRIVS, 1, 0, 0, 0);
 }

@@ -15,7 +15,7 @@ namespace taihu {
 // Draco) are parsed by a program of their own, `taihu-reader`, with little memory, little processor
 // time and no way to write a file. What it found comes back flat, and is checked again.
 
-/// What the program may take: RLIMIT_AS, RLIMIT_CPU.
+/// What the program may take: RLIMIT_AS, RLIMIT_CPU; and 16 open files.
 struct ForeignLimits {
     std::uint64_t memory_bytes = 0;
     unsigned processor_s = 0;
