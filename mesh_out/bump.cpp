@@ -99,7 +99,7 @@ Image bump_offsets(const Image& heights, MapBorder border) {
     return out;
 }
 
-Image bump_heights(const Image& offsets, MapBorder border) {
+Image bump_heights(const Image& offsets, MapBorder border, Progress* progress) {
     check(offsets, 2, "offsets");
     const Grid grid = grid_of(offsets, border);
     std::vector<double> heights = summed(grid, offsets);
@@ -110,6 +110,7 @@ Image bump_heights(const Image& offsets, MapBorder border) {
     const double target = kEnough * kEnough * dot(whole, whole);
     double rr = dot(r, r);
     for (int i = 0; i < 8 * (grid.w + grid.h) && rr > target; ++i) {
+        check_cancelled(progress);
         std::fill(ap.begin(), ap.end(), 0.0);
         grid.each_pair([&](std::size_t a, std::size_t b, std::size_t) {
             ap[a] += p[a] - p[b];

@@ -4,6 +4,7 @@
 
 #include "stats/core/box.h"
 #include "stats/core/image.h"
+#include "stats/core/progress.h"
 #include "stats/core/tri_mesh.h"
 
 namespace taihu {
@@ -26,8 +27,8 @@ Image bump_offsets(const Image& heights, MapBorder border);
 /// The height field with the offsets, its mean 0: exactly that, but for rounding, where they came
 /// from one; else the one whose offsets differ least in the mean square. Sums along rows and
 /// columns, then conjugate gradients: O(pixels) in the first case, O(pixels * side) in the other.
-/// \throws as bump_offsets().
-Image bump_heights(const Image& offsets, MapBorder border);
+/// \throws as bump_offsets(); cancelled.
+Image bump_heights(const Image& offsets, MapBorder border, Progress* progress = nullptr);
 
 /// Unit normals in the frame of the texture, 3 channels (u, v, out): (-scale u, -scale v, 1),
 /// normalised. \param scale  texels per unit of height.

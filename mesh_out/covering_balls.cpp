@@ -25,9 +25,8 @@ std::vector<Sphere> balls_over_cubes(std::span<const Vec3> points, double radius
 std::vector<Sphere> balls_apart(std::span<const Vec3> points, double radius_m) {
     std::vector<Sphere> balls;
     for (const Vec3& p : points)
-        if (std::none_of(balls.begin(), balls.end(), [&](const Sphere& s) {
-                return length(p - s.center) <= s.radius_m;
-            }))
+        if (std::none_of(balls.begin(), balls.end(),
+                         [&](const Sphere& s) { return length(p - s.center) <= s.radius_m; }))
             balls.push_back({p, radius_m});
     return balls;
 }

@@ -51,8 +51,10 @@ struct TileSurface {
 inline constexpr int kTileHalo_vox = 160;
 
 /// The part of extract()'s surface that stands across the edges between voxels which begin in a
-/// tile: tiles without gaps have all of its triangles, each once, bit for bit. But for what looks
-/// at whole pieces: those of a voxel or two that extract() turns to face outwards stay as they are.
+/// tile: tiles without gaps have all of its triangles, each once, bit for bit. But for two things.
+/// Pieces of a voxel or two that extract() turns to face outwards stay as they are. And where
+/// triangles still cross once cells were made smaller, extract() makes more of them smaller; tiles
+/// stay as they are, alike on both sides of a seam, for each attempt looks 40 voxels farther.
 ///
 /// Where vertices go depends on what is around them. Those of triangles that cross go together, so
 /// a tile is only known where no chain of such places leads from it to the end of what is given.

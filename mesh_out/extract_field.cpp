@@ -22,7 +22,7 @@ namespace {
 
 using openvdb::CoordBBox;
 constexpr double kReach_vox = 1.25; // a level set of half width 3 tells that much between voxels
-constexpr int kMostAttempts = 2;
+constexpr int kMostAttempts = 5, kMostAttemptsOfTile = 2; // each looks kRetry_vox farther
 constexpr int kRetry_vox = 40; // what becomes of cells that were made smaller reaches so far
 constexpr int kPart_vox = 16;  // parts of triangles come out of them so far at most
 constexpr int kAbout_vox = 8;  // triangles reach out of the voxels of their edges so far at most
@@ -81,6 +81,7 @@ Extracted extracted(const openvdb::FloatGrid& solid, const CoordBBox& given, con
                            : level_set_probe({openvdb::FloatGrid::ConstPtr(), &solid});
     const SurfacePoints points(solid, *probe, lattice);
     SmallCells small;
+    const int most_attempts = tile ? kMostAttemptsOfTile : kMostAttempts;
     for (int attempt = 0;; ++attempt) {
         choose_cell_sizes(blocks, solid, {settings.most_spacing, settings.bound_vox}, small,
                           progress);
@@ -89,11 +90,12 @@ Extracted extracted(const openvdb::FloatGrid& solid, const CoordBBox& given, con
             refuse_clipped(solid);
         Mesher mesher(blocks, surface, points, small, certainty, progress);
         const std::vector<std::uint32_t> stuck = mesher.run();
-        if (attempt + 1 < kMostAttempts) // elsewhere some may have been stuck
+        const bool last = attempt + 1 >= most_attempts;
+        if (!last) // elsewhere some may have been stuck
             certainty.spread(kRetry_vox);
 
         // Some cross to the last in solids that the voxels hardly resolve; the certificate counts.
-        if (stuck.empty() || attempt + 1 == kMostAttempts) {
+        if (stuck.empty() || last) {
             if (tile)
                 result.owned = mesher.owned_by(*tile);
             result.mesh = mesher.take();

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <limits>
 #include <optional>
 #include <string>
 #include <vector>
@@ -18,6 +19,7 @@ namespace taihu {
 namespace {
 
 constexpr double kOn = 1e-3;        ///< of the spacing: on the surface
+constexpr double kStride = 1. / 16; ///< spacings, at least
 constexpr double kFarthest = 8;     ///< spacings that a projection may take
 constexpr std::size_t kChunk = 512; ///< faces or points that are summed together
 constexpr double kClose = 0.7;      ///< of the limit: looked at more closely
@@ -26,6 +28,7 @@ constexpr double kVeryClose = 0.9;  ///< looked at once more, every
 constexpr double kFine = 0.15;      ///< of the spacing
 constexpr double kSure = 0.98;      ///< of the limit: points between samples may be farther
 constexpr int kFinest = 64;         ///< parts of an edge
+constexpr double kNowhere = std::numeric_limits<double>::infinity();
 
 /// The nearest point of the surface that can be reached by projecting onto the primitive that
 /// decides at `p`, then onto all that turn out to decide where that leads.
@@ -43,6 +46,34 @@ std::optional<Vec3> surface_point(const FieldProbe& field, const Vec3& p, double
             return std::nullopt;
     }
     return std::nullopt;
+}
+
+/// How far the field's sign changes from `p` in any of 26 directions, or `farthest_m` where it does
+/// not before: the surface is there or nearer. In the rough of a level set, where values are no
+/// distances, projections leap over the nearest point.
+double to_sign_change(const FieldProbe& field, const Vec3& p, double spacing_m, double farthest_m) {
+    const double own_m = field.at(p).value_m;
+    for (int k = 0; k < 27; ++k) {
+        const Vec3 to{double(k / 9 - 1), double(k / 3 % 3 - 1), double(k % 3 - 1)};
+        if (k == 13)
+            continue;
+        const Vec3 along = normalized(to);
+        double at_m = 0, before_m = 0, value_m = own_m;
+        while (at_m < farthest_m && (value_m < 0) == (own_m < 0)) {
+            before_m = at_m;
+            at_m += std::max(std::fabs(value_m), kStride * spacing_m);
+            value_m = field.at(p + along * at_m).value_m;
+        }
+        if ((value_m < 0) == (own_m < 0))
+            continue;
+        while (at_m - before_m > kOn * spacing_m) {
+            const double middle_m = (at_m + before_m) / 2;
+            const bool past = (field.at(p + along * middle_m).value_m < 0) != (own_m < 0);
+            (past ? at_m : before_m) = middle_m;
+        }
+        farthest_m = std::min(farthest_m, at_m);
+    }
+    return farthest_m;
 }
 
 struct Sum {
@@ -137,13 +168,16 @@ FieldDistance field_distance(const TriMesh& mesh, const FieldProbe& field, const
                                              std::to_string(spacing_m) +
                                              ", must be at least 1e-5 of the mesh");
     const SurfaceDistance to_surface(surface), to_mesh(mesh);
+    const double trusted_m = std::min(limit_m, spacing_m);
     const auto add = [&](const Vec3& p, Sum& sum) {
-        auto on = surface_point(field, p, spacing_m);
-        if (!on) { // went astray, as it does not from beside the surface
+        const auto on = surface_point(field, p, spacing_m);
+        double d = on ? length(p - *on) : kNowhere;
+        if (d > trusted_m) { // went astray, as it does less from beside the surface
             const Vec3 beside = to_surface.nearest(p);
-            on = surface_point(field, beside, spacing_m).value_or(beside);
+            const Vec3 near = surface_point(field, beside, spacing_m).value_or(beside);
+            d = to_sign_change(field, p, spacing_m, std::min(d, length(p - near)));
         }
-        sum.add(p, length(p - *on), limit_m, apart);
+        sum.add(p, d, limit_m, apart);
     };
     const std::vector<Vec3>& points = mesh.positions;
     const auto edges = edges_of(mesh);

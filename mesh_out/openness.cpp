@@ -8,6 +8,7 @@
 
 #include "mesh_out/io/mesh_formats_detail.h"
 #include "mesh_out/ray_scene_detail.h"
+#include "stats/core/error.h"
 
 namespace taihu {
 namespace {

@@ -60,7 +60,8 @@ SurfaceFile format_surface(const openvdb::FloatGrid& solid, const Field* field, 
             p += shift;
         file.bytes = format_mesh(level.decoded, format, recipe);
     }
-    file.certificate = certify(parse_mesh(file.bytes, format, "output", {.is_own = true}).levels.at(0));
+    file.certificate =
+        certify(parse_mesh(file.bytes, format, "output", {.is_own = true}).levels.at(0));
     require_certificate(file.certificate, "mesh");
     return file;
 }

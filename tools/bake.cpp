@@ -10,6 +10,8 @@
 namespace taihu {
 namespace {
 
+constexpr double kTexel_bytes = 30, kMaps_bytes = 80; // at the peak, as measured
+
 struct BakeArgs {
     SolidOptions solid;
     LevelOptions levels;
@@ -61,6 +63,9 @@ void run(const BakeArgs& args, const CLI::App& verb, const Console& console) {
     else if (verb.count("--crease") > 0)
         throw Error(Fault::bad_argument, "--crease: is of a low mesh; name one behind the high");
     args.files.check({args.solid.path, args.low}, console);
+    const double side_px = args.maps.side_px.value_or(2 * BakeSettings{}.side_px); // may be doubled
+    console.require_memory(side_px * side_px, args.files.maps.empty() ? kTexel_bytes : kMaps_bytes,
+                           "give a smaller --size");
     console.result(args.low.empty() ? bake_levels(args, console) : bake_pair(args, console));
 }
 
@@ -121,7 +126,7 @@ void add_bake(CLI::App& app, Console& console) {
     args->levels.add_options(*verb);
     args->solid.add_voxel_options(*verb);
     verb->callback(
-        [args, verb, &console] { console.with_threads([&] { run(*args, *verb, console); }); });
+        [args, verb, &console] { console.within_limits([&] { run(*args, *verb, console); }); });
 }
 
 } // namespace taihu

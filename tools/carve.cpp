@@ -46,6 +46,10 @@ LawHoles read_or_place(const CarveArgs& args, const Solid& base, const Console& 
                                              ", it is for a law.json");
     LawHoles holes;
     holes.placed.holes = read_holes(args.holes);
+    if (holes.placed.holes.empty())
+        throw Error(Fault::bad_input, args.holes.string() +
+                                          ": a header without holes: nothing would be carved; name "
+                                          "a table that has some");
     holes.node = holes_node(base_name(args.holes), sha256_hex(read_file(args.holes)));
     return holes;
 }
@@ -132,11 +136,9 @@ void write_carved_tiles(const CarveArgs& args, const Solid& base, const LawHoles
 }
 
 /// Before the work: whether base, rock and what is made of it fit into memory.
-void refuse_if_too_much(const CarveArgs& args, const Solid& base, const LawHoles& holes) {
-    std::optional<double> asked;
-    if (!args.base.memory.empty())
-        asked = memory_bytes("--memory", args.base.memory);
-    const double limit = memory_limit_bytes(asked);
+void refuse_if_too_much(const CarveArgs& args, const Solid& base, const LawHoles& holes,
+                        const Console& console) {
+    const double limit = memory_limit_bytes(console.memory_bytes());
     MemoryUse use{.base_leaves = static_cast<double>(base.grid->tree().leafCount()),
                   .cleaned = true,
                   .meshed = !is_vdb(args.out)};
@@ -175,7 +177,7 @@ void run(const CarveArgs& args, const Console& console) {
     if (args.tiles.tiles)
         return write_carved_tiles(args, base, holes, {*args.tiles.tiles, cleaning}, recipe,
                                   console);
-    refuse_if_too_much(args, base, holes);
+    refuse_if_too_much(args, base, holes, console);
     report_stage(console.progress, "carving");
     const CarveResult rock = carve(*base.grid, holes.placed.holes, console.progress);
     const CarvedVolume carved = carved_volume(*base.grid, *rock.rock);
@@ -245,9 +247,7 @@ void add_carve(CLI::App& app, Console& console) {
     args->base.add_voxel_options(*verb);
     args->surface.add_options(*verb);
     args->tiles.add_option(*verb);
-    verb->add_option("--memory", args->base.memory,
-                     "Refuse what would need more, as 4GB [what the machine has left]");
-    verb->callback([args, &console] { console.with_threads([&] { run(*args, console); }); });
+    verb->callback([args, &console] { console.within_limits([&] { run(*args, console); }); });
 }
 
 } // namespace taihu

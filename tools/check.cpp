@@ -7,7 +7,6 @@
 #include "tools/solid_files.h"
 #include "vdb_ops/placed_level_set_field.h"
 #include "vdb_ops/rasterize.h"
-#include "vdb_ops/vdb_file.h"
 
 namespace taihu {
 namespace {
@@ -33,7 +32,7 @@ MeshFile content(const SolidOptions& options, const Console& console) {
     if (!is_vdb(options.path))
         return read_mesh(options.path, options.mesh_settings(), console.progress);
     MeshFile file;
-    file.levels = {extract_uniform(*read_solid_vdb(options.path, console.progress).solid, console.progress)};
+    file.levels = {extract_uniform(*read_level_set(options.path, console), console.progress)};
     return file;
 }
 
@@ -149,7 +148,7 @@ void add_check(CLI::App& app, Console& console) {
                      "Measure the distance to this solid or mesh, both ways");
     verb->add_option("--within", args->within, "and say no when it is more: 0.5vox, 2mm, 1%");
     args->file.add_mesh_options(*verb);
-    verb->callback([args, &console] { console.with_threads([&] { run(*args, console); }); });
+    verb->callback([args, &console] { console.within_limits([&] { run(*args, console); }); });
 }
 
 } // namespace taihu

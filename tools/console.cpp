@@ -3,13 +3,18 @@
 #include <csignal>
 #include <cstdio>
 #include <ctime>
+#include <fstream>
 #include <pthread.h>
 #include <semaphore.h>
+#include <sys/resource.h>
+#include <tbb/info.h>
 #include <unistd.h>
 
 #include "stats/core/error.h"
 #include "stats/core/file.h"
 #include "stats/core/text.h"
+#include "tools/units.h"
+#include "vdb_ops/estimate.h"
 #include "vdb_ops/tiles.h"
 
 namespace taihu {
@@ -52,6 +57,14 @@ void start_backstop() {
     ::pthread_create(&thread, &small, end_soon, nullptr);
     ::pthread_attr_destroy(&small);
     ::pthread_sigmask(SIG_SETMASK, &before, nullptr);
+}
+
+/// What this process has of data and stacks by now.
+double data_bytes() {
+    std::ifstream pages("/proc/self/statm");
+    double size = 0, resident = 0, shared = 0, text = 0, lib = 0, data = 0;
+    pages >> size >> resident >> shared >> text >> lib >> data;
+    return data * static_cast<double>(::sysconf(_SC_PAGESIZE));
 }
 
 } // namespace
@@ -116,8 +129,42 @@ CLI::App* Console::verb(CLI::App& app, const std::string& name, const std::strin
     verb->add_option("--threads", n_threads, "Threads to use; results do not depend on it [all]")
         ->check(CLI::Range(1, 1024))
         ->group(group);
+    verb->add_option("--memory", memory,
+                     "Refuse what would need more, as 4GB, and end what takes more [what the "
+                     "machine has left]")
+        ->group(group);
     verb->footer("\nExamples:\n" + examples);
     return verb;
+}
+
+std::optional<double> Console::memory_bytes() const {
+    if (memory.empty())
+        return std::nullopt;
+    return taihu::memory_bytes("--memory", memory);
+}
+
+void Console::require_memory(double n, double bytes_each, const std::string& remedy) const {
+    constexpr double kProgram_bytes = 45e6;
+    const double needed = kProgram_bytes + n * bytes_each;
+    const double limit = memory_limit_bytes(memory_bytes());
+    if (needed > limit)
+        throw Error(Fault::unsupported, "refused: would need about " + human_bytes(needed) +
+                                            " (limit " + human_bytes(limit) + "); " + remedy);
+}
+
+/// Estimates refuse before the work; this is for what they did not foresee. Beyond what the program
+/// holds already, and the stacks of its threads, of which little is ever touched.
+void Console::limit_memory() const {
+    constexpr double kStack_bytes = 8 << 20;
+    const auto asked = memory_bytes();
+    rlimit data{};
+    if (!asked || ::getrlimit(RLIMIT_DATA, &data) != 0)
+        return;
+    const int n = n_threads > 0 ? n_threads : tbb::info::default_concurrency();
+    const double most = data_bytes() + *asked + kStack_bytes * n;
+    if (most < static_cast<double>(data.rlim_cur)) // RLIM_INFINITY is the greatest number
+        data.rlim_cur = static_cast<rlim_t>(most);
+    ::setrlimit(RLIMIT_DATA, &data);
 }
 
 void Console::say_text(const std::string& line) const {

@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <filesystem>
 #include <memory>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -38,7 +39,8 @@ private:
 /// stdout carries the result alone; people are told on stderr.
 struct Console {
     bool json = false, quiet = false, no_clobber = false;
-    int n_threads = 0; ///< 0: all
+    int n_threads = 0;  ///< 0: all
+    std::string memory; ///< --memory
     Progress* progress = nullptr;
     nlohmann::ordered_json* sink = nullptr; ///< takes the result instead of stdout, where set
 
@@ -46,15 +48,23 @@ struct Console {
     CLI::App* verb(CLI::App& app, const std::string& name, const std::string& does,
                    const std::string& examples);
 
-    /// Runs a verb on as many threads as were asked for, be they more than the machine has.
+    /// Runs a verb within the memory and on as many threads as were asked for, be they more than
+    /// the machine has.
     template <class Run>
-    void with_threads(Run&& run) const {
+    void within_limits(Run&& run) const {
+        limit_memory();
         if (n_threads == 0)
             return run();
         const auto n = static_cast<std::size_t>(n_threads);
         const tbb::global_control most(tbb::global_control::max_allowed_parallelism, n);
         tbb::task_arena(n_threads).execute(run);
     }
+
+    /// What --memory allows [bytes].
+    std::optional<double> memory_bytes() const;
+    /// Before the work. \throws Error unsupported: `n` things of so many bytes each are more than
+    /// --memory, or the machine, allows.
+    void require_memory(double n, double bytes_each, const std::string& remedy) const;
 
     /// A line for people, unless -q; held until show_said(), so that a verb which refuses says
     /// nothing but why.
@@ -79,6 +89,7 @@ struct Console {
     void may_write_tiles(const std::filesystem::path& folder) const;
 
 private:
+    void limit_memory() const;
     mutable std::vector<std::string> said_;
 };
 

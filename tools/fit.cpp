@@ -450,7 +450,7 @@ void add_fit(CLI::App& app, Console& console) {
     add_photo_options(*verb, *args);
     add_fit_options(*verb, *args);
     add_count_options(*verb, *args);
-    verb->callback([args, &console] { console.with_threads([&] { run(*args, console); }); });
+    verb->callback([args, &console] { console.within_limits([&] { run(*args, console); }); });
 }
 
 } // namespace taihu

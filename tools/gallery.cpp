@@ -197,7 +197,7 @@ void add_gallery(CLI::App& app, Console& console) {
         ->capture_default_str();
     verb->add_option("--only", args->only, "These rows alone, as T11,D17 [all]")->delimiter(',');
     verb->add_flag("--list", args->list, "Print the rows, and make nothing");
-    verb->callback([args, &console] { console.with_threads([&] { run(*args, console); }); });
+    verb->callback([args, &console] { console.within_limits([&] { run(*args, console); }); });
 }
 
 } // namespace taihu

@@ -125,7 +125,8 @@ void run(const SolidOptions& options, const Console& console) {
         throw Error(Fault::unsupported,
                     options.path.string() + ": unknown extension '" + extension +
                         "'; use .vdb, .obj, .ply, .stl, .off, .glb, .drc, .json or .csv");
-    if (json.contains("recipe") && json["recipe"].is_string()) { // text in the file, an object for people and programs
+    if (json.contains("recipe") &&
+        json["recipe"].is_string()) { // text in the file, an object for people and programs
         const std::string text = json["recipe"].get<std::string>();
         json["recipe"] = recipe_solid(text) ? Json::parse(text) : Json(nullptr);
     }
@@ -158,7 +159,7 @@ void add_info(CLI::App& app, Console& console) {
             "(.json), or a table (.csv)")
         ->required();
     args->add_mesh_options(*verb);
-    verb->callback([args, &console] { console.with_threads([&] { run(*args, console); }); });
+    verb->callback([args, &console] { console.within_limits([&] { run(*args, console); }); });
 }
 
 } // namespace taihu

@@ -38,7 +38,7 @@ void add_lod(CLI::App& app, Console& console) {
     args->levels.add_options(*verb);
     args->files.add_options(*verb);
     args->solid.add_voxel_options(*verb);
-    verb->callback([args, &console] { console.with_threads([&] { run(*args, console); }); });
+    verb->callback([args, &console] { console.within_limits([&] { run(*args, console); }); });
 }
 
 } // namespace taihu

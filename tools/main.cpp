@@ -29,7 +29,8 @@ int fail(int code, const std::string& message) {
 int fail_foreign(const std::exception& e) {
     const std::string what = e.what();
     if (dynamic_cast<const std::bad_alloc*>(&e))
-        return fail(kFailed, "out of memory; use a larger voxel or fewer holes");
+        return fail(kFailed,
+                    "out of memory; use a larger voxel, fewer holes or a greater --memory");
     if (what.starts_with("pthread_create") || dynamic_cast<const std::system_error*>(&e))
         return fail(kFailed,
                     what + "; check paths and rights, free memory, or use fewer --threads");

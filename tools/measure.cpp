@@ -10,7 +10,6 @@
 #include "tools/measure_report.h"
 #include "tools/solid_files.h"
 #include "vdb_ops/rasterize.h"
-#include "vdb_ops/vdb_file.h"
 #include "vdb_ops/volume.h"
 
 namespace taihu {
@@ -38,7 +37,7 @@ Measured measured(const SolidOptions& options, const std::filesystem::path& path
                   const Console& console) {
     Measured m;
     if (is_vdb(path)) {
-        m.grid = read_solid_vdb(path, console.progress).solid;
+        m.grid = read_level_set(path, console);
         m.mesh = extract_uniform(*m.grid, console.progress);
         m.volume_m3 = volume_m3(*m.grid);
     } else {
@@ -246,7 +245,7 @@ void add_measure(CLI::App& app, Console& console) {
     verb->add_flag("--tradition", args->tradition,
                    "How thin, seen through, leaky and wrinkled a garden rock is");
     args->file.add_voxel_options(*verb);
-    verb->callback([args, &console] { console.with_threads([&] { run(*args, console); }); });
+    verb->callback([args, &console] { console.within_limits([&] { run(*args, console); }); });
 }
 
 } // namespace taihu

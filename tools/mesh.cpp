@@ -55,7 +55,7 @@ void add_mesh(CLI::App& app, Console& console) {
         ->required();
     args->surface.add_options(*verb);
     args->solid.add_voxel_options(*verb);
-    verb->callback([args, &console] { console.with_threads([&] { run(*args, console); }); });
+    verb->callback([args, &console] { console.within_limits([&] { run(*args, console); }); });
 }
 
 } // namespace taihu

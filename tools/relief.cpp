@@ -9,6 +9,7 @@
 #include "stats/core/file_set.h"
 #include "stats/core/text.h"
 #include "stats/number_detail.h"
+#include "tools/bump_files.h"
 #include "tools/console.h"
 #include "tools/units.h"
 #include "vdb_ops/roughness.h"
@@ -17,11 +18,12 @@ namespace taihu {
 namespace {
 
 constexpr double kPresetSide = 0.512; // m: lengths of a preset are those of a tile of this side
+constexpr double kMidpoint_bytes = 13, kRegions_bytes = 31; // a point, at the peak, as measured
 constexpr const char* kRecipe = "taihu_relief";
 
 struct ReliefArgs {
     std::string kind, pixel = "1mm", amplitude, radius, wavelength, phase, draws;
-    std::string light_azimuth, light_elevation;
+    std::string light_azimuth, light_elevation, as;
     std::optional<int> size, patches, regions, arms, colors;
     std::optional<double> hurst;
     std::optional<std::uint64_t> color_seed;
@@ -234,6 +236,10 @@ void write_tile(const std::filesystem::path& path, const ReliefSettings& setting
 }
 
 nlohmann::ordered_json make_tile(const ReliefArgs& args, Plan plan, const Console& console) {
+    const double side_px = plan.settings.size_px;
+    console.require_memory(side_px * side_px,
+                           is_midpoint(plan.settings.law) ? kMidpoint_bytes : kRegions_bytes,
+                           "give a smaller --size");
     ReliefTile tile = make_relief(plan.settings, console.progress);
     if (plan.departure_m)
         scale_to(*plan.departure_m, plan.settings, tile, console);
@@ -306,6 +312,14 @@ void run(const ReliefArgs& args, const CLI::App& verb, const Console& console) {
     }
     if (!args.preview.empty())
         console.may_write(args.preview, {args.out, args.from});
+    if (!args.as.empty()) {
+        if (!has_extension(args.from, ".exr"))
+            throw Error(Fault::bad_argument, "relief: --as is for --from TILE.exr; drop it");
+        refuse_beside(verb, "a map written the other way", {"--from", "--output", "--as"});
+        return console.result(
+            convert_bumps(args.from, args.out,
+                          args.as == "offsets" ? BumpForm::offsets : BumpForm::heights, console));
+    }
     if (!photo)
         return console.result(make_tile(
             args, args.from.empty() ? plan_of(args, verb) : replayed(args, verb), console));
@@ -393,7 +407,8 @@ void add_relief(CLI::App& app, Console& console) {
         "  taihu relief sinusoid --arms 2 --colors 30 -o waves.exr --preview waves.png\n"
         "  taihu relief --from photo.png --patch 400,300,512,512 --pixel 0.1mm --json\n"
         "  taihu relief --from photo.png --pixel 0.1mm -o alike.exr\n"
-        "  taihu relief --from rock.exr -o again.exr");
+        "  taihu relief --from rock.exr -o again.exr\n"
+        "  taihu relief --from rock.exr --as offsets -o bumps.exr");
     verb->add_option("kind", args->kind,
                      "fractal, broken-rock, unglazed-china, casting, convex, concave, sinusoid or "
                      "modified-sinusoid");
@@ -402,10 +417,14 @@ void add_relief(CLI::App& app, Console& console) {
     verb->add_option("--from", args->from,
                      "A photo (.png): its roughness, and with -o a tile as rough; or a tile (.exr) "
                      "or its recipe (.json), made again");
+    verb->add_option("--as", args->as,
+                     "With --from TILE.exr: offsets, its heights (channel Y) as differences to the "
+                     "right and up (u, v), or heights, those back")
+        ->check(CLI::IsMember({"heights", "offsets"}));
     add_tile_options(*verb, *args);
     add_photo_options(*verb, *args);
     verb->callback(
-        [args, verb, &console] { console.with_threads([&] { run(*args, *verb, console); }); });
+        [args, verb, &console] { console.within_limits([&] { run(*args, *verb, console); }); });
 }
 
 } // namespace taihu

@@ -14,10 +14,11 @@
 #include "tools/units.h"
 #include "vdb_ops/relief.h"
 #include "vdb_ops/relief_around.h"
-#include "vdb_ops/vdb_file.h"
 
 namespace taihu {
 namespace {
+
+constexpr double kPixel_bytes = 18; // at the peak, as measured
 
 struct RenderArgs {
     SolidOptions file;
@@ -48,9 +49,9 @@ void parse_picture_size(const std::string& text, RenderSettings& settings) {
 
 std::vector<TriMesh> meshes_of(const RenderArgs& args, const Console& console) {
     if (is_vdb(args.file.path)) {
-        const VdbFile file = read_solid_vdb(args.file.path, console.progress);
-        TriMesh mesh = extract_uniform(*file.solid, console.progress);
-        mesh.normals = surface_normals(*file.solid, mesh.positions);
+        const openvdb::FloatGrid::Ptr solid = read_level_set(args.file.path, console);
+        TriMesh mesh = extract_uniform(*solid, console.progress);
+        mesh.normals = surface_normals(*solid, mesh.positions);
         return {std::move(mesh)};
     }
     return read_mesh(args.file.path, args.file.mesh_settings(), console.progress).levels;
@@ -215,6 +216,8 @@ void run(RenderArgs& args, const Console& console) {
     args.settings.smooth = !args.flat;
     if (!args.material.empty())
         light_plainly(args);
+    console.require_memory(double(args.settings.width) * args.settings.height, kPixel_bytes,
+                           "give a smaller --size");
     std::vector<TriMesh> meshes = meshes_of(args, console);
     lay_relief(args, meshes.front());
     report_stage(console.progress, "rendering");
@@ -306,7 +309,7 @@ void add_render(CLI::App& app, Console& console) {
         ->check(CLI::Range(0.0, 9.2e18))
         ->capture_default_str();
     args->file.add_mesh_options(*verb);
-    verb->callback([args, &console] { console.with_threads([&] { run(*args, console); }); });
+    verb->callback([args, &console] { console.within_limits([&] { run(*args, console); }); });
 }
 
 } // namespace taihu

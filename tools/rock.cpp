@@ -17,7 +17,7 @@ namespace {
 
 struct RockArgs {
     std::filesystem::path recipe, from, out, report, holes;
-    std::string preset, voxel, height, memory;
+    std::string preset, voxel, height;
     std::optional<int> dim;
     std::optional<std::uint64_t> seed;
     std::vector<std::string> settings;
@@ -71,7 +71,7 @@ void change(Source& source, const RockArgs& args) {
     }
 }
 
-RecipeSettings recipe_settings(const RockArgs& args) {
+RecipeSettings recipe_settings(const RockArgs& args, const Console& console) {
     RecipeSettings s;
     s.dim = args.dim;
     s.seed = args.seed;
@@ -79,8 +79,7 @@ RecipeSettings recipe_settings(const RockArgs& args) {
         s.voxel_m = length_m("--voxel", args.voxel);
     if (!args.height.empty())
         s.height_m = length_m("--height", args.height);
-    if (!args.memory.empty())
-        s.memory_bytes = memory_bytes("--memory", args.memory);
+    s.memory_bytes = console.memory_bytes();
     s.meshed = !args.out.empty() && !args.tiles.tiles && !is_vdb(args.out);
     return s;
 }
@@ -178,19 +177,19 @@ void run(const RockArgs& args, const Console& console) {
     change(source, args);
     const RecipeAssets assets = recipe_assets(source.folders, console);
     if (args.dry_run)
-        return estimate(source, assets, recipe_settings(args), console);
+        return estimate(source, assets, recipe_settings(args, console), console);
     OutputFiles holes;
     if (args.tiles.tiles) {
         const RecipeTiles made =
-            make_recipe_tiles(source.text, source.where, assets, recipe_settings(args), args.out,
-                              *args.tiles.tiles, console.progress);
+            make_recipe_tiles(source.text, source.where, assets, recipe_settings(args, console),
+                              args.out, *args.tiles.tiles, console.progress);
         console.say_all(args.out.string(), made.found);
         add_holes(args, made.holes, source.where, holes, console);
         holes.publish();
         return console.result(tiles_result(args.out, made.tiles, console));
     }
-    const RecipeSolid made =
-        make_recipe(source.text, source.where, assets, recipe_settings(args), console.progress);
+    const RecipeSolid made = make_recipe(source.text, source.where, assets,
+                                         recipe_settings(args, console), console.progress);
     console.say_all(args.out.string(), made.found);
     add_holes(args, made.holes, source.where, holes, console);
     const auto json = write_rock(args, made, console);
@@ -230,11 +229,9 @@ void add_rock(CLI::App& app, Console& console) {
     verb->add_option("--voxel", args->voxel, "or the size of a voxel, as 5mm")->excludes(dim);
     verb->add_option("--assets", args->assets, "More folders with the recipe's files");
     args->tiles.add_option(*verb);
-    verb->add_option("--memory", args->memory,
-                     "Refuse what would need more, as 4GB [what the machine has left]");
     verb->add_flag("--dry-run", args->dry_run, "Say what it will need, and make nothing");
     args->surface.add_options(*verb);
-    verb->callback([args, &console] { console.with_threads([&] { run(*args, console); }); });
+    verb->callback([args, &console] { console.within_limits([&] { run(*args, console); }); });
 }
 
 } // namespace taihu

@@ -8,6 +8,8 @@
 namespace taihu {
 namespace {
 
+constexpr double kHole_bytes = 180; // its line of text in it, at the peak, as measured
+
 struct SampleArgs {
     std::filesystem::path law, out;
     SolidOptions solid;
@@ -17,6 +19,8 @@ struct SampleArgs {
 
 /// Holes inside a solid, or in a box that stands on the origin's corner.
 LawHoles sample(const SampleArgs& args, const Console& console) {
+    console.require_memory(static_cast<double>(args.placement.count.value_or(0)), kHole_bytes,
+                           "ask for a smaller --count");
     if (args.box.empty() == args.solid.path.empty())
         throw Error(Fault::bad_argument,
                     "sample: say where the holes go: one of --in SOLID and --box X,Y,Z");
@@ -70,7 +74,7 @@ void add_sample(CLI::App& app, Console& console) {
     verb->add_option("--box", args->box, "or a box from the origin: X,Y,Z");
     args->placement.add_options(*verb);
     args->solid.add_voxel_options(*verb);
-    verb->callback([args, &console] { console.with_threads([&] { run(*args, console); }); });
+    verb->callback([args, &console] { console.within_limits([&] { run(*args, console); }); });
 }
 
 } // namespace taihu

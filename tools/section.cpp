@@ -288,7 +288,7 @@ void add_section(CLI::App& app, Console& console) {
         ->excludes(holes);
     args->solid.add_voxel_options(*verb);
     add_photo_options(*verb, args->photos);
-    verb->callback([args, &console] { console.with_threads([&] { run(*args, console); }); });
+    verb->callback([args, &console] { console.within_limits([&] { run(*args, console); }); });
 }
 
 } // namespace taihu

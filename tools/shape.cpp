@@ -15,7 +15,7 @@ namespace taihu {
 namespace {
 
 struct ShapeArgs {
-    std::string kind, size = "1m", tube, round, voxel, memory, damping, along, bump;
+    std::string kind, size = "1m", tube, round, voxel, damping, along, bump;
     std::filesystem::path out, stages;
     ShapeSettings settings;
     CaveSettings cave;
@@ -174,10 +174,7 @@ void run(ShapeArgs& args, const CLI::App& verb, const Console& console) {
                                              : length_m("--voxel", args.voxel, {0, box.longest()});
         refuse_if_too_large(0, box, lattice.voxel_m);
         const auto field = shape_field(args.settings);
-        std::optional<double> asked;
-        if (!args.memory.empty())
-            asked = memory_bytes("--memory", args.memory);
-        const double limit = memory_limit_bytes(asked);
+        const double limit = memory_limit_bytes(console.memory_bytes());
         if (may_exceed(box, lattice.voxel_m, {}, limit))
             refuse_if_over({.leaves = estimate_size(*field, lattice).n_leaves}, lattice.voxel_m,
                            limit);
@@ -187,15 +184,15 @@ void run(ShapeArgs& args, const CLI::App& verb, const Console& console) {
                                 format_recipe(node, lattice.voxel_m, args.settings.seed), {},
                                 console));
     } else {
-        if (args.dim || !args.voxel.empty() || !args.memory.empty())
+        if (args.dim || !args.voxel.empty())
             throw Error(Fault::bad_argument,
-                        "shape: --dim, --voxel and --memory are for a .vdb; a mesh takes "
-                        "--subdivisions");
+                        "shape: --dim and --voxel are for a .vdb; a mesh takes --subdivisions");
         const MeshFormat format = *mesh_format(args.out);
         const std::string bytes =
             format_mesh(mesh, format, format_recipe(node, 0, args.settings.seed));
-        require_certificate(certify(parse_mesh(bytes, format, args.out.string(), {.is_own = true}).levels.at(0)),
-                            args.out.string());
+        require_certificate(
+            certify(parse_mesh(bytes, format, args.out.string(), {.is_own = true}).levels.at(0)),
+            args.out.string());
         write_file(args.out, bytes);
         json["triangles"] = mesh.triangles.size();
         json["volume_m3"] = signed_volume_m3(mesh);
@@ -277,10 +274,8 @@ void add_shape(CLI::App& app, Console& console) {
         verb->add_option("--dim", args->dim, "A .vdb, a cave: voxels along the longest axis [256]")
             ->check(CLI::Range(4, 65536));
     verb->add_option("--voxel", args->voxel, "or the size of a voxel, as 5mm")->excludes(dim);
-    verb->add_option("--memory", args->memory,
-                     "A .vdb: refuse what would need more, as 4GB [what the machine has left]");
     verb->callback(
-        [args, verb, &console] { console.with_threads([&] { run(*args, *verb, console); }); });
+        [args, verb, &console] { console.within_limits([&] { run(*args, *verb, console); }); });
 }
 
 } // namespace taihu

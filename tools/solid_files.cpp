@@ -7,6 +7,7 @@
 #include "stats/core/error.h"
 #include "stats/core/file.h"
 #include "stats/core/sha256.h"
+#include "vdb_ops/estimate.h"
 #include "vdb_ops/level_set_box.h"
 #include "vdb_ops/rasterize.h"
 #include "vdb_ops/recipe.h"
@@ -28,6 +29,11 @@ std::string lower_extension(const std::filesystem::path& path) {
     return extension;
 }
 
+void refuse_large_surface(const openvdb::FloatGrid& solid, const Console& console) {
+    refuse_if_over({.leaves = static_cast<double>(solid.tree().leafCount()), .meshed = true},
+                   lattice_of(solid).voxel_m, memory_limit_bytes(console.memory_bytes()));
+}
+
 bool same_level_set(const openvdb::FloatGrid& a, const openvdb::FloatGrid& b) {
     if (!a.tree().hasSameTopology(b.tree()) || a.transform() != b.transform())
         return false;
@@ -43,8 +49,9 @@ std::shared_ptr<const Field> field_of(const openvdb::FloatGrid& grid, const std:
     std::string why = "its recipe makes another solid with this version";
     try {
         const std::filesystem::path folder = path.has_parent_path() ? path.parent_path() : ".";
-        const RecipeSolid again = make_recipe(
-            recipe, base_name(path), recipe_assets({folder}, console), {}, console.progress);
+        const RecipeSolid again =
+            make_recipe(recipe, base_name(path), recipe_assets({folder}, console),
+                        {.memory_bytes = console.memory_bytes()}, console.progress);
         if (same_level_set(grid, *again.solid))
             return again.field;
     } catch (const Error& e) {
@@ -139,8 +146,7 @@ Solid read_solid(const SolidOptions& options, const Console& console, Surfaces s
         settings.voxel_m = options.voxel.empty()
                                ? voxel_for(box, options.dim.value_or(kDefaultDim))
                                : length_m("--voxel", options.voxel, {0, box.longest()});
-        if (!options.memory.empty())
-            settings.memory_bytes = memory_bytes("--memory", options.memory);
+        settings.memory_bytes = console.memory_bytes();
         report_stage(console.progress, "voxelizing");
         VoxelizeResult result = voxelize(mesh, where, settings, console.progress);
         solid.grid = result.solid;
@@ -159,6 +165,14 @@ Solid read_solid(const SolidOptions& options, const Console& console, Surfaces s
                                options.mesh_settings().unit_m, options.z_up(), settings.close);
     }
     solid.measure = {lattice_of(*solid.grid).voxel_m, longest_m(*solid.grid)};
+    if (surfaces == Surfaces::wanted)
+        refuse_large_surface(*solid.grid, console);
+    return solid;
+}
+
+openvdb::FloatGrid::Ptr read_level_set(const std::filesystem::path& path, const Console& console) {
+    const openvdb::FloatGrid::Ptr solid = read_solid_vdb(path, console.progress).solid;
+    refuse_large_surface(*solid, console);
     return solid;
 }
 

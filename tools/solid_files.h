@@ -28,7 +28,6 @@ struct SolidOptions {
     std::optional<std::string> shells; ///< union, parity
     std::optional<double> unit_m;
     std::optional<std::string> up; ///< y, z
-    std::string memory;            ///< refuse a mesh whose level set would need more
 
     void add_mesh_options(CLI::App& verb);  ///< --unit, --up
     void add_voxel_options(CLI::App& verb); ///< --dim, --voxel, --close, --shells, and these
@@ -57,6 +56,10 @@ enum class Surfaces { none, wanted };
 /// field is the solid's.
 Solid read_solid(const SolidOptions& options, const Console& console,
                  Surfaces surfaces = Surfaces::none);
+
+/// A level set of which a surface will be made. \throws Error as read_solid_vdb(); unsupported: one
+/// that needs more memory than there is.
+openvdb::FloatGrid::Ptr read_level_set(const std::filesystem::path& path, const Console& console);
 
 /// Files of a recipe, and how its meshes are read.
 RecipeAssets recipe_assets(std::vector<std::filesystem::path> folders, const Console& console);

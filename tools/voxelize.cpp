@@ -40,9 +40,7 @@ void add_voxelize(CLI::App& app, Console& console) {
         ->required();
     verb->add_option("-o,--output", args->out, "Where to write the level set (.vdb)")->required();
     args->mesh.add_voxel_options(*verb);
-    verb->add_option("--memory", args->mesh.memory,
-                     "Refuse what would need more, as 4GB [what the machine has left]");
-    verb->callback([args, &console] { console.with_threads([&] { run(*args, console); }); });
+    verb->callback([args, &console] { console.within_limits([&] { run(*args, console); }); });
 }
 
 } // namespace taihu

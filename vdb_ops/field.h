@@ -12,6 +12,7 @@ struct Lattice {
     double voxel_m = 0;       ///< > 0
     Vec3 origin;              ///< world position of voxel (0, 0, 0) [m]
     float half_width_vox = 3; ///< distances beyond this are clamped to it [voxels], 2..16
+    friend bool operator==(const Lattice&, const Lattice&) = default;
 };
 
 /// What is known of a region without evaluating it: further than the half width from the surface on

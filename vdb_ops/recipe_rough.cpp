@@ -40,9 +40,16 @@ public:
         return std::make_shared<PlacedLevelSetField>(solid(scene, at).grid);
     }
     NodeSolid solid(const RecipeScene& scene, const Similarity& at) const override {
+        openvdb::FloatGrid::Ptr grid = made_.lock();
+        if (grid && made_on_ == scene.lattice && made_at_ == at)
+            return {grid, nullptr};
         const NodeSolid of = of_->solid(scene, at);
         report_stage(scene.progress, stage_);
-        return {operation_(*of.grid, of_->box({}), at, scene), nullptr};
+        grid = operation_(*of.grid, of_->box({}), at, scene);
+        made_ = grid;
+        made_on_ = scene.lattice;
+        made_at_ = at;
+        return {grid, nullptr};
     }
     std::shared_ptr<const Field> tile_field(const RecipeScene&, const Similarity&) const override {
         throw Error(Fault::unsupported, where_ + ": needs the whole solid in memory, and tiles are "
@@ -57,6 +64,10 @@ private:
     double growth_m_;
     const char* stage_;
     std::string where_;
+    /// The last solid, while anyone holds it: nodes around may ask for it more than once.
+    mutable std::weak_ptr<openvdb::FloatGrid> made_;
+    mutable Lattice made_on_;
+    mutable Similarity made_at_;
 };
 
 Node only_child(const Keys& keys, RecipeParser& parser) {

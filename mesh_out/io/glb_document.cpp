@@ -7,6 +7,7 @@
 #include "mesh_out/io/binary_detail.h"
 #include "stats/core/error.h"
 #include "stats/core/text.h"
+#include "stats/io/json_detail.h"
 
 namespace taihu {
 namespace {
@@ -144,19 +145,7 @@ void GlbDocument::read_chunks() {
 }
 
 void GlbDocument::parse_json(std::string_view text) {
-    if (text.size() > kMaxJsonBytes)
-        fail(std::to_string(text.size()) + " bytes of JSON, at most 2^26 are read",
-             "split the file");
-    if (json_depth(text) > kMaxJsonDepth)
-        fail("the JSON is nested deeper than " + std::to_string(kMaxJsonDepth), "export it again");
-    try {
-        root_ = Json::parse(text);
-    } catch (const Json::parse_error& e) {
-        fail_at(where_, offset(text) + (e.byte > 0 ? e.byte - 1 : 0), "the JSON is broken here",
-                "copy or export it again");
-    } catch (const Json::exception&) { // a number that no double can hold
-        fail("the JSON holds a number out of range", "export it again");
-    }
+    root_ = taihu::parse_json(text, where_ + ":JSON", kMaxJsonBytes, kMaxJsonDepth);
     if (!root_.is_object())
         fail("the JSON is not an object", "export it again");
 }

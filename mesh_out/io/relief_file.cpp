@@ -14,7 +14,7 @@ namespace taihu {
 
 ReliefTile read_relief(const std::filesystem::path& path, const char* channel) {
     const auto refuse = [&](const std::string& what) {
-        throw Error(Fault::bad_input, path.string() + ": " + what + "; make the tile again");
+        throw Error(Fault::bad_input, path.string() + ": " + what + "; make it again");
     };
     const std::vector<std::string> wanted = {channel};
     ExrImage exr = read_exr(path, wanted);
@@ -36,7 +36,7 @@ ReliefTile read_relief(const std::filesystem::path& path, const char* channel) {
                " heights, must have 2 x 2 or more");
     if (!std::all_of(image.pixels.begin(), image.pixels.end(),
                      [](float h) { return std::isfinite(h); }))
-        refuse("has a height that is not finite");
+        refuse(std::string("channel '") + channel + "' has a value that is not finite");
     tile.heights = std::move(exr.image);
     return tile;
 }

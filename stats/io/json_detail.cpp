@@ -129,8 +129,8 @@ void check_keys(const json& object, const std::string& where,
         if (std::find(known.begin(), known.end(), key) != known.end())
             continue;
         const std::string nearest = did_you_mean(key, known);
-        refuse(where, "unknown key '" + printable(key) + "'" +
-                          (nearest.empty() ? "; drop it" : nearest));
+        refuse(where,
+               "unknown key '" + printable(key) + "'" + (nearest.empty() ? "; drop it" : nearest));
     }
     for (const std::string_view key : required)
         if (!object.contains(key))

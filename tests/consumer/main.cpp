@@ -18,7 +18,8 @@ int main() {
     const auto holes = place_holes(Law::exponential(5), {.porosity = 0.2}, *base).holes;
     const auto rock = clean(*carve(*base, holes).rock).solid;
     const DifferenceField field(ball, std::make_shared<BallsField>(holes)); // makes rims sharp
-    const SurfaceFile file = format_surface(*rock, &field, MeshFormat::glb, {.max_error_m = 0.01}, "");
+    const SurfaceFile file =
+        format_surface(*rock, &field, MeshFormat::glb, {.max_error_m = 0.01}, "");
     write_file("rock.glb", file.bytes);
     std::printf("%zu triangles, genus %lld\n", file.certificate.n_triangles,
                 static_cast<long long>(file.certificate.genus));

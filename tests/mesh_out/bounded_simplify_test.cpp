@@ -215,7 +215,8 @@ TEST(BoundedSimplifier, StopsWhenTold) {
     for (const int n : {0, 1, 20}) {
         CancelledAfter progress(n);
         BoundedSimplifier simplifier(dense(exact_rock()), exact_rock(), {.spacing_m = 1});
-        expect_error(Fault::cancelled, "cancelled", [&] { simplifier.within(0.25, {}, &progress); });
+        expect_error(Fault::cancelled, "cancelled",
+                     [&] { simplifier.within(0.25, {}, &progress); });
     }
 }
 

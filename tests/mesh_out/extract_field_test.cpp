@@ -321,6 +321,21 @@ void expect_refused(const openvdb::FloatGrid& grid, Fault fault, const std::stri
     }
 }
 
+TEST(ExtractField, KeepsWallsThinnerThanAVoxelApart) {
+    // Of its cells some have to be made smaller again and again before no triangles cross.
+    const RecipeSolid shell = make_recipe(R"({"taihu_recipe": 1, "voxel_m": 0.08333333333333333,
+        "seed": 941, "solid": {"warp": {"of": {"shell": {"of": {"transform": {"of":
+        {"rounded_box": {"size_m": [0.391, 0.47, 0.407], "round_m": 0.117}}, "scale": 1.14,
+        "axis": [-0.439, -0.00817, 1], "angle_deg": -127, "move_m": [0.0775, -0.22, 0.479]}},
+        "inwards_m": 0.0467, "outwards_m": 0.0243}},
+        "amplitude_m": 0.0327, "largest_m": 0.544, "smallest_m": 0.136}}})",
+                                          "r.json", {});
+    const LabelledMesh mesh = extract(*shell.solid, nullptr);
+    const Certificate c = certify({mesh.positions, mesh.triangles, {}});
+    EXPECT_TRUE(c.holds());
+    EXPECT_EQ(c.n_self_intersections, 0u);
+}
+
 TEST(ExtractField, RefusesWhatHasNoSurface) {
     const std::vector<Sphere> all = {{{0, 0, 0}, 2}};
     expect_refused(*holed_ball_grid(0.5, 0.1, all), Fault::bad_argument, "nothing is left");

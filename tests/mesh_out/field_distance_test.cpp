@@ -4,8 +4,13 @@
 
 #include <gmock/gmock.h>
 
+#include "mesh_out/extract.h"
 #include "stats/core/error.h"
+#include "stats/core/rng.h"
 #include "vdb_ops/balls_field.h"
+#include "vdb_ops/carve.h"
+#include "vdb_ops/placed_level_set_field.h"
+#include "vdb_ops/rasterize.h"
 #include "vdb_ops/shapes.h"
 
 namespace taihu {
@@ -57,6 +62,25 @@ TEST(FieldDistance, WhatIsKeptApartCountsApart) {
     EXPECT_LT(rest.max_m, 0.02);
     EXPECT_TRUE(rest.beyond.empty());
     EXPECT_EQ(rest.n_samples, all.n_samples);
+}
+
+TEST(FieldDistance, IsNotMisledByValuesThatAreNoDistances) {
+    // Walls of a voxel between many holes: between its voxels the level set is anything but even.
+    std::vector<Sphere> holes;
+    const Rng rng{5, 0};
+    for (std::uint64_t i = 0; i < 400; ++i)
+        holes.push_back({{rng.uniform(i, 0) - .5, rng.uniform(i, 1) - .5, rng.uniform(i, 2) - .5},
+                         0.05 + 0.03 * rng.uniform(i, 3)});
+    const double voxel_m = 1. / 48;
+    const auto block =
+        rasterize(*shape_field({.kind = ShapeKind::box, .size_m = {1, 1, 1}}), {voxel_m, {}, 3});
+    const openvdb::FloatGrid::Ptr rock = carve(*block, holes).rock;
+    const TriMesh mesh = extract_uniform(*rock);
+    const PlacedLevelSetField field(rock->deepCopy());
+    const auto probe = field.probe(bounds(mesh).dilated(8 * voxel_m), 4 * voxel_m);
+    const FieldDistance d = field_distance(mesh, *probe, mesh, voxel_m, 0.25 * voxel_m);
+    EXPECT_GT(d.beyond.size(), 100);      // it is rough
+    EXPECT_LT(d.max_to_field_m, voxel_m); // every vertex is in a cell with the surface
 }
 
 TEST(FieldDistance, RefusesWhatIsNone) {

@@ -6,7 +6,8 @@ import path from 'node:path';
 import { load, modulesFolder } from './modules.mjs';
 
 const kTypes = { '.js': 'text/javascript', '.wasm': 'application/wasm', '.glb': 'model/gltf-binary' };
-const kFlags = ['--no-sandbox', '--disable-gpu', '--enable-unsafe-swiftshader', '--no-first-run'];
+const kFlags = ['--no-sandbox', '--disable-gpu', '--enable-unsafe-swiftshader', '--no-first-run',
+  '--disable-dev-shm-usage'];
 
 /** A page around a module script that has THREE and `loadGlb(url)`, and sets window.result. */
 function page(script) {
@@ -71,6 +72,7 @@ export async function show(script, files, picture) {
   } finally {
     await browser.close();
     server.close();
-    fs.rmSync(profile, { recursive: true, force: true });
+    // Chromium's last processes may write for a moment still.
+    fs.rmSync(profile, { recursive: true, force: true, maxRetries: 20, retryDelay: 100 });
   }
 }

@@ -34,7 +34,8 @@ Sample rock_1() {
 
 TEST(ChiSquaredTest, FindsTheExponentialLawFitForTheThesisRock) {
     const Sample sample = rock_1();
-    const ChiSquaredTest test = chi_squared_test(sample, fit_law(sample, Family::exponential).law, 1);
+    const ChiSquaredTest test =
+        chi_squared_test(sample, fit_law(sample, Family::exponential).law, 1);
     // Known to the digits given, by another program.
     EXPECT_NEAR(test.statistic, 2.39, 0.005);
     EXPECT_EQ(test.df, 3);

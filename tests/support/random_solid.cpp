@@ -71,26 +71,29 @@ private:
                 {"smallest_m", std::max(largest / 4, voxel_m_)}};
     }
     Json rough(Json of) {
-        switch (pick(6)) {
+        const int which = pick(8);
+        switch (which) {
         case 0:
             return named("rough", noise(std::move(of)));
-        case 1: {
-            const auto kind = std::array{"furrows", "facets", "beds"}[std::size_t(pick(3))];
+        case 1:
+        case 2:
+        case 3: {
+            const auto kind = std::array{"furrows", "facets", "beds"}[std::size_t(which - 1)];
             kinds_.insert(kind);
             return named("rough", {{"of", std::move(of)},
                                    {"relief", kind},
                                    {"amplitude_m", uniform(0.02, 0.1)},
                                    {"largest_m", uniform(0.2, 0.4)}});
         }
-        case 2:
+        case 4:
             return named("warp", noise(std::move(of)));
-        case 3:
+        case 5:
             return named("weather", {{"of", std::move(of)},
                                      {"sigma_m", uniform(0.02, 0.08)},
                                      {"steps", 1 + pick(3)},
                                      {"rounding", uniform(0, 1)},
                                      {"hollowing", uniform(-1, 1)}});
-        case 4: {
+        case 6: {
             const double least = uniform(0.05, 0.1);
             return named("bites", {{"of", std::move(of)},
                                    {"count", 1 + pick(20)},

@@ -4,7 +4,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "tests/support/process.h"
+#include "tests/support/command.h"
 
 namespace taihu {
 namespace {
@@ -15,7 +15,7 @@ using testing::StartsWith;
 
 const std::vector<std::string> kVerbs = {"fit",    "sample", "shape", "voxelize", "carve",
                                          "mesh",   "lod",    "check", "measure",  "section",
-                                         "render", "info",   "rock",  "relief"};
+                                         "render", "info",   "rock",  "relief",   "bake"};
 
 long lines(const std::string& text) {
     return std::count(text.begin(), text.end(), '\n');
@@ -99,6 +99,37 @@ TEST(Command, NoClobberKeepsWhatIsThere) {
     EXPECT_EQ(said.exit_code, 1);
     EXPECT_THAT(said.err, HasSubstr("a.ply: exists"));
     EXPECT_EQ(read_file(scratch / "a.ply"), "mine");
+}
+
+TEST(Command, MemoryThatIsNotAllowedIsRefusedOrNotHad) {
+    const Scratch folder;
+    must("taihu shape boulder --dim 100 -o a.vdb -q", folder);
+    must("taihu fit " TAIHU_DATA "/measurements/rock1.csv -o law.json -q", folder);
+    for (const std::string command :
+         {"mesh a.vdb -o b.ply", "lod a.vdb -o b.glb", "bake a.vdb -o b.glb", "check a.vdb",
+          "check b.ply --against a.vdb", "measure a.vdb", "render a.vdb -o b.png",
+          "render a.vdb --size 8192x8192 -o b.png", "relief fractal --size 8193 -o b.exr",
+          "relief convex --size 2049 -o b.exr",
+          "sample law.json --box 1 --scale 1cm --count 1000000 -o b.csv"}) {
+        write_file(folder / "b.ply", "");
+        const Finished refused = run("taihu " + command + " --memory 60MB", folder.path());
+        EXPECT_EQ(refused.exit_code, 1) << command;
+        EXPECT_THAT(refused.err, testing::MatchesRegex("taihu: refused: [^\n]+\n")) << command;
+        EXPECT_THAT(refused.err, HasSubstr("(limit 60 MB)")) << command;
+    }
+    EXPECT_EQ(std::filesystem::file_size(folder / "b.ply"), 0u);
+    must("taihu mesh a.vdb -o b.ply --memory 500MB -q", folder);
+    must("taihu check b.ply --against a.vdb --memory 500MB -q", folder);
+    EXPECT_EQ(run("taihu info a.vdb --memory lots", folder.path()).exit_code, 2);
+#ifndef TAIHU_SANITIZED // they end the program themselves
+    // What no estimate foresees meets the limit itself.
+    const Finished out = run("taihu section a.vdb --planes 10 --photos p --pixel 0.4mm -o c.csv "
+                             "--memory 30MB",
+                             folder.path());
+    EXPECT_EQ(out.exit_code, 1) << out.err;
+    EXPECT_THAT(out.err, testing::MatchesRegex("taihu: out of memory; [^\n]+\n"));
+    EXPECT_FALSE(std::filesystem::exists(folder / "p"));
+#endif
 }
 
 TEST(Command, ASignalCancelsAndLeavesNothing) {

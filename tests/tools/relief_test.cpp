@@ -88,6 +88,41 @@ TEST(Relief, APhotoBecomesATileThatIsAsRough) {
     result("taihu relief --from photo.png", scratch); // the figures alone
 }
 
+TEST(Relief, HeightsAndOffsetsMakeEachOther) {
+    const Scratch scratch;
+    for (const char* kind : {"fractal --size 65", "convex --tileable --size 64 --pixel 3mm"}) {
+        result("taihu relief " + std::string(kind) + " -o heights.exr", scratch);
+        result("taihu relief --from heights.exr --as offsets -o offsets.exr", scratch);
+        const json back = result("taihu relief --from offsets.exr --as heights -o b.exr", scratch);
+        const ExrImage offsets = read_exr(scratch / "offsets.exr");
+        EXPECT_THAT(offsets.channels, ElementsAre("u", "v"));
+        EXPECT_THAT(offsets.attributes, testing::Contains(testing::Pair("u_unit", "m per texel")));
+        const std::vector<std::string> only_heights = {"Y"};
+        const ExrImage heights = read_exr(scratch / "heights.exr", only_heights);
+        const ExrImage again = read_exr(scratch / "b.exr");
+        for (const char* key : {"pixel_m", "wrap", "Y_unit"}) {
+            const auto has = [&](const auto& pair) { return pair.first == key; };
+            EXPECT_EQ(*std::find_if(again.attributes.begin(), again.attributes.end(), has),
+                      *std::find_if(heights.attributes.begin(), heights.attributes.end(), has));
+        }
+        const std::vector<float>&a = heights.image.pixels, &b = again.image.pixels;
+        ASSERT_EQ(a.size(), b.size());
+        const auto [lo, hi] = std::minmax_element(a.begin(), a.end());
+        for (std::size_t i = 0; i < a.size(); ++i)
+            ASSERT_NEAR(a[i] - a[0], b[i] - b[0], 1e-5 * (*hi - *lo)) << kind;
+        EXPECT_LT(back["left_rms_m"].get<double>(), 1e-5 * back["offsets_rms_m"].get<double>());
+    }
+    // Leaning to the right everywhere, on a map that repeats: no height field does.
+    write_exr(scratch / "slope.exr", {Image(8, 8, 2), {"u", "v"}, {{"wrap", "periodic"}}});
+    ExrImage slope = read_exr(scratch / "slope.exr");
+    for (std::size_t i = 0; i < slope.image.pixels.size(); i += 2)
+        slope.image.pixels[i] = 1;
+    write_exr(scratch / "slope.exr", slope);
+    const json none = result("taihu relief --from slope.exr --as heights -o flat.exr", scratch);
+    EXPECT_NEAR(none["highest_m"].get<double>(), 0, 1e-6);
+    EXPECT_DOUBLE_EQ(none["left_rms_m"].get<double>(), none["offsets_rms_m"].get<double>());
+}
+
 TEST(Relief, RefusesInOneLine) {
     const Scratch scratch;
     write_image(scratch / "black.png", Image(128, 128, 3));
@@ -117,6 +152,10 @@ TEST(Relief, RefusesInOneLine) {
     fails("--from black.png --hurst 0.5 -o a.exr", 2, "--hurst is not for a photo");
     fails("--from black.png", 1, "black or white");
     fails("--from black.png --patch 100,100,100,100", 2, "is not inside of the photo");
+    fails("--from plain.exr --as heights -o a.exr", 1, "plain.exr: has no channel 'u'");
+    fails("--from plain.exr --as slopes -o a.exr", 2, "--as");
+    fails("--from plain.exr --as offsets --seed 4 -o a.exr", 2, "--seed is not for a map");
+    fails("casting --as offsets -o a.exr", 2, "--as is for --from TILE.exr");
     fails("--from a.jpg -o a.exr", 1, "--from takes a photo (.png)");
     EXPECT_FALSE(std::filesystem::exists(scratch / "a.exr"));
 }

@@ -201,6 +201,10 @@ TEST(Verbs, ALawWithoutAScaleOrANumberIsRefused) {
         run("taihu carve base.vdb --holes law.json --scale 10% -o a.vdb", scratch.path());
     EXPECT_EQ(number.exit_code, 2);
     EXPECT_THAT(number.err, HasSubstr("--count"));
+    write_file(scratch / "none.csv", "x_m,y_m,z_m,radius_m\n");
+    const Finished none = run("taihu carve base.vdb --holes none.csv -o a.vdb", scratch.path());
+    EXPECT_EQ(none.exit_code, 1);
+    EXPECT_THAT(none.err, HasSubstr("none.csv: a header without holes"));
 }
 
 TEST(Verbs, HolesOfALawMayFollowItsOwnDensity) {

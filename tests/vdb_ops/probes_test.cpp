@@ -99,7 +99,7 @@ void expect_probe(const Field& field, double tolerance_vox, double band_vox = 3,
     EXPECT_LE(worst, tolerance_vox * kVoxel);
     if (smooth) {
         EXPECT_LE(n_bent, n / 7 / 20); // few points lie there
-        EXPECT_LE(worst_slope, 0.02); // some parts bend at single places: edges of rounded boxes
+        EXPECT_LE(worst_slope, 0.02);  // some parts bend at single places: edges of rounded boxes
     }
     EXPECT_EQ(n_missed, 0u);
     EXPECT_EQ(n_outside, 0u);

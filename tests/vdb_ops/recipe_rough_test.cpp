@@ -74,6 +74,16 @@ TEST(RecipeRough, BuildsOnFieldsAndUnderThem) {
     EXPECT_GT(cut, 0.2);
 }
 
+TEST(RecipeRough, ANodeIsMadeOnceThoughHolesAreBlendedIntoIt) {
+    const std::string holes =
+        R"({"holes": {"law": {"family": "exponential", "parameters": {"rate": 10}}, "count": 9}})";
+    const RecipeSolid sponge =
+        made(recipe(R"({"difference": {"blend_m": 0.02, "of": [)" + kBites + ", " + holes + "]}}"));
+    EXPECT_EQ(std::count_if(sponge.found.begin(), sponge.found.end(),
+                            [](const std::string& line) { return line.ends_with("40 bites"); }),
+              1);
+}
+
 TEST(RecipeRough, EstimatesComeFromACoarserSolid) {
     const RecipeEstimate e = estimate_recipe(recipe(kRough), "r.json", {});
     EXPECT_GT(e.size.n_leaves, 50);

@@ -16,6 +16,11 @@ function(taihu_defaults target)
     target_link_options(${target} PUBLIC -fsanitize=${TAIHU_SANITIZE})
     target_compile_definitions(${target} PRIVATE TAIHU_SANITIZED)
   endif()
+  get_target_property(_type ${target} TYPE)
+  if(TAIHU_SANITIZE MATCHES thread AND _type STREQUAL EXECUTABLE)
+    target_sources(${target} PRIVATE ${PROJECT_SOURCE_DIR}/tests/support/tsan_tbb.cpp)
+    target_link_libraries(${target} PRIVATE TBB::tbb ${CMAKE_DL_LIBS})
+  endif()
 endfunction()
 
 # taihu_module(name SOURCES a.cpp ... HEADERS a.h ...): the library taihu_<name>, taihu::<name>.

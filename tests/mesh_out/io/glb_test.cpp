@@ -218,7 +218,10 @@ TEST(GlbReader, NamesWhatIsWrongWithTheContainer) {
     bad(bytes, 8, 0, "byte 8: the header says");
     bad(bytes, 15, 1, "byte 12: a chunk reaches past");
     bad(bytes, 16, 'X', "byte 12: the first chunk is not JSON");
-    bad(bytes, 21, '!', "byte 21: the JSON is broken here");
+    bad(bytes, 21, '!', "JSON:1:2: not JSON");
+    std::string twice = bytes;
+    twice.replace(twice.find("\"nodes\""), 7, "\"asset\"");
+    expect_refused(twice, MeshFormat::glb, Fault::bad_input, {"key \"asset\" is there twice"});
     expect_refused("{\"asset\": {}}", MeshFormat::glb, Fault::bad_input, {"save the .gltf"});
     std::string deep(100000, '[');
     std::string file = "glTF";
