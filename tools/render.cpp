@@ -178,6 +178,7 @@ std::vector<std::string> render_turn(const RenderArgs& args, const TriMesh& mesh
             std::copy_n(image.at(0, y), 3 * s.width,
                         sheet.at(i % columns * s.width, i / columns * s.height + y));
     }
+    check_cancelled(console.progress);
     if (apart) {
         pictures->publish(std::filesystem::path(files.back()).filename());
     } else {

@@ -46,6 +46,7 @@ void run(const SampleArgs& args, const Console& console) {
         throw Error(Fault::unsupported, args.out.string() + ": holes are a table; name a .csv");
     console.may_write(args.out, {args.law, args.solid.path, args.placement.where});
     const LawHoles holes = sample(args, console);
+    check_cancelled(console.progress);
     write_file(args.out, format_holes(holes.placed.holes, holes.comments));
     nlohmann::ordered_json json = {{"file", args.out.string()},
                                    {"holes", holes.placed.holes.size()},

@@ -193,6 +193,7 @@ void run(ShapeArgs& args, const CLI::App& verb, const Console& console) {
         require_certificate(
             certify(parse_mesh(bytes, format, args.out.string(), {.is_own = true}).levels.at(0)),
             args.out.string());
+        check_cancelled(console.progress);
         write_file(args.out, bytes);
         json["triangles"] = mesh.triangles.size();
         json["volume_m3"] = signed_volume_m3(mesh);

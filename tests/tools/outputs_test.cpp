@@ -92,7 +92,8 @@ INSTANTIATE_TEST_SUITE_P(Signal, Stopping, testing::Values("", "--foreground"));
 
 TEST(Backstop, EndsWorkThatDoesNotLookUp) {
     const Scratch folder;
-    // 1.3 million triangles are looked at for crossings without a look at signals.
+    // 1.3 million triangles are looked at for crossings without a look at signals; where that is
+    // over within the second that it is given, the look before writing ends it.
     const Finished said = run("timeout -s TERM --preserve-status 0.6 taihu shape boulder "
                               "--subdivisions 8 -q -o x.glb",
                               folder.path());
