@@ -16,6 +16,7 @@ namespace {
 
 constexpr std::uint64_t kFewestProfiles = 8, kFewProfiles = 20;
 constexpr double kLeastLength = 1e-9, kMostLength = 1e9;
+constexpr double kLeastArea = 1e-18, kMostArea = 1e24;
 constexpr double kHiddenShare = 0.14; // see LawRanking
 
 void check_settings(const Sample& sample, Family family, const FitSettings& settings) {
@@ -48,6 +49,10 @@ void check_profiles(const Sample& sample) {
         if (bin.count > 0 && !(bin.hi >= kLeastLength && bin.hi <= kMostLength))
             throw Error(Fault::bad_input, "fit: a bin ends at " + shortest(bin.hi) +
                                               "; must be in 1e-9..1e9, choose another unit");
+    if (const auto area = searched_area(sample);
+        area && !(*area >= kLeastArea && *area <= kMostArea))
+        throw Error(Fault::bad_input, "fit: the area searched is " + shortest(*area) +
+                                          "; must be in 1e-18..1e24, choose another unit");
 }
 
 // Nothing but the limit itself, or the bin that begins there: any law that is steep enough will do.

@@ -55,7 +55,7 @@ struct Fit {
 /// \param family  not Family::empirical (unfold.h).
 /// \throws Error bad_argument: the level, the resolution, the family; bad_input: as Detection,
 ///         fewer than 8 profiles, all of them at the detection limit (no spread to fit), profiles
-///         outside of 1e-9..1e9; numeric: no maximum.
+///         outside of 1e-9..1e9, an area outside of 1e-18..1e24; numeric: no maximum.
 /// Cost: 100 to 200 passes over the sample, of two parameters 2200. Fewer than 20 profiles are
 /// noted, as are a law at the edge of what is tried and intervals without an end.
 Fit fit_law(const Sample& sample, Family family, const FitSettings& settings = {});

@@ -192,6 +192,11 @@ TEST(FitExponential, RefusesWhatCannotBeFitted) {
     Sample hidden = rock_1();
     hidden.detection_limit = 0.15;
     expect_refused(hidden, {}, "detection limit is 0.15 but the smallest profile is 0.1");
+    for (const double area : {1e-320, 1e-19, 1e25, 1e300}) { // holes per volume: infinite or none
+        Sample searched = rock_1();
+        searched.area = area;
+        expect_refused(searched, {}, "; must be in 1e-18..1e24, choose another unit");
+    }
 }
 
 TEST(FitLaw, FindsTheFamiliesOfTheThesisRock) {
