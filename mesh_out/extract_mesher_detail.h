@@ -99,6 +99,7 @@ private:
     Vertices near_to(const std::vector<std::uint8_t>& picked) const;
     void add_movable(std::span<const Triangle> triangles, bool all, Vertices& hit) const;
     bool is_needle(const Triangle& t) const;
+    bool has_own_cell(std::uint32_t v) const;
     bool is_alone(std::uint32_t v) const;
     Vertices all_not_alone() const;
     void add_in_one_place(Vertices among, Vertices& hit) const;

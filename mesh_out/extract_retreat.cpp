@@ -167,7 +167,7 @@ std::vector<std::uint8_t> Mesher::untamed() const {
         for (std::size_t v = r.begin(); v < r.end(); ++v) {
             const CellRef& cell = surface_.cell(v);
             tame[v] =
-                next_[v] == kNone &&
+                next_[v] == kNone && has_own_cell(static_cast<std::uint32_t>(v)) &&
                 cell_box(v).dilated(-kLeast * points_.voxel_m()).contains(mesh_.positions[v]) &&
                 alternating_faces(
                     blocks_[cell.block].corners(CellBlocks::local(cell.first), cell.size)) == 0;
@@ -324,13 +324,17 @@ bool Mesher::is_needle(const Triangle& t) const {
            kThin * std::max({length_squared(ab), length_squared(ac), length_squared(bc)});
 }
 
+/// Not so where sheets pass on both sides of a cell's middle, as through opposite corners.
+bool Mesher::has_own_cell(std::uint32_t v) const {
+    return (v == 0 || surface_.cell(v - 1) != surface_.cell(v)) &&
+           (v + 1 == mesh_.positions.size() || surface_.cell(v + 1) != surface_.cell(v));
+}
+
 /// Most are, well in their cells.
 bool Mesher::is_alone(std::uint32_t v) const {
     const double least_m = kLeastApart_vox * points_.voxel_m();
     return around(v).empty() ||
-           (cell_box(v).dilated(-least_m).contains(mesh_.positions[v]) &&
-            (v == 0 || surface_.cell(v - 1) != surface_.cell(v)) &&
-            (v + 1 == mesh_.positions.size() || surface_.cell(v + 1) != surface_.cell(v)));
+           (cell_box(v).dilated(-least_m).contains(mesh_.positions[v]) && has_own_cell(v));
 }
 
 Mesher::Vertices Mesher::all_not_alone() const {

@@ -336,6 +336,24 @@ TEST(ExtractField, KeepsWallsThinnerThanAVoxelApart) {
     EXPECT_EQ(c.n_self_intersections, 0u);
 }
 
+TEST(ExtractField, SheetsThroughOppositeCornersOfACellDoNotCross) {
+    // A slit far thinner than a voxel, with two vertices in one cell and no face of it ambiguous.
+    const RecipeSolid rock = make_recipe(R"({"taihu_recipe": 1, "voxel_m": 0.08333333333333333,
+        "seed": 6166, "solid": {"rough": {"of": {"union": {"of": [{"intersection": {"of": [
+        {"shell": {"of": {"offset": {"of": {"transform": {"of": {"transform": {"of":
+        {"transform": {"of": {"box": {"size_m": [0.93868, 0.91668, 0.33409]}}, "scale": 1.329,
+        "axis": [-0.71717, -0.21561, 1], "angle_deg": 156.28, "move_m": [0.24561, -0.43704,
+        -0.16788]}}, "scale": 1.4852, "axis": [0.96034, -0.13742, 1], "angle_deg": 169.96,
+        "move_m": [-0.50031, -0.3341, -0.1448]}}, "scale": 1.4484, "axis": [0.35954, -0.19142, 1],
+        "angle_deg": 22.372, "move_m": [0.060614, -0.45254, 0.29078]}}, "by_m": -0.035247}},
+        "inwards_m": 0.055385, "outwards_m": 0.02015}}, {"box": {"size_m": [2, 2, 2]}}]}},
+        {"sphere": {"size_m": [0.7, 0.7, 0.7]}}]}}, "relief": "beds", "amplitude_m": 0.067017,
+        "largest_m": 0.2024}}})",
+                                         "r.json", {});
+    const LabelledMesh mesh = extract(*rock.solid, rock.field.get());
+    EXPECT_EQ(certify({mesh.positions, mesh.triangles, {}}).n_self_intersections, 0u);
+}
+
 TEST(ExtractField, RefusesWhatHasNoSurface) {
     const std::vector<Sphere> all = {{{0, 0, 0}, 2}};
     expect_refused(*holed_ball_grid(0.5, 0.1, all), Fault::bad_argument, "nothing is left");
