@@ -119,7 +119,6 @@ int exact_orient3d(const Vec3& a, const Vec3& b, const Vec3& c, const Vec3& d) {
 
 struct Point2 {
     double u = 0, v = 0;
-    friend bool operator==(const Point2&, const Point2&) = default;
 };
 
 /// Sign of det(b - a, c - a), exact: +1 when a, b, c turn counter-clockwise.

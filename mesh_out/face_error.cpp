@@ -20,7 +20,6 @@ constexpr double kStep = 1.6;     ///< spacings from sample to sample
 constexpr double kFineStep = 0.5; ///< where a primitive turns out to have creases
 constexpr double kFlat = 1e-6;    ///< slope of a value that is held to a band
 constexpr double kSteep = 0.95;   ///< gradients of distances have length 1
-constexpr double kSmooth = 2.85;  ///< length of the sum of three gradients of 1 that differ little
 constexpr double kPlanarMargin = 1.1; ///< rims of other surfaces are bent; planes are not
 
 Vec3 middle(const FaceErrors::Corners& f) {

@@ -151,13 +151,15 @@ private:
             }
         std::uint32_t best = kNoFace;
         double most = 0;
-        for (const auto& [host, l] : borders)
+        for (const auto& [host, l] : borders) {
+            const Vec3 facing = charts_.directions[host];
             if (l > most && std::all_of(faces_[c].begin(), faces_[c].end(), [&](std::uint32_t f) {
-                    return dot(normals_[f], charts_.directions[host]) >= least_facing_;
+                    return dot(normals_[f], facing) >= least_facing_;
                 })) {
                 best = host;
                 most = l;
             }
+        }
         return best;
     }
     /// Those of `guests` that overlap nothing there.

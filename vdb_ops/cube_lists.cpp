@@ -75,8 +75,9 @@ void CubeLists::find(const VoxelBall& ball, std::uint32_t number, Hits& hits) {
                     covered.store(1, std::memory_order_relaxed);
                 // Written in any case and kept if it counts: no branch to guess wrong.
                 *hit = {static_cast<std::uint32_t>(cube), number};
-                hit += (near2 + nearest2(c.z, z, z + edge) < reach2) &
-                       !covered.load(std::memory_order_relaxed);
+                const int is_near = near2 + nearest2(c.z, z, z + edge) < reach2;
+                const int is_open = !covered.load(std::memory_order_relaxed);
+                hit += is_near & is_open;
             }
         }
     }

@@ -25,7 +25,7 @@ typedef double D8 __attribute__((vector_size(64)));
 
 namespace {
 
-constexpr V8 kZ = {0, 1, 2, 3, 4, 5, 6, 7}, kZero = {}, kOne = kZero + 1.f, kLast = kZero + 7.f;
+constexpr V8 kZ = {0, 1, 2, 3, 4, 5, 6, 7}, kZero = {}, kOne = kZero + 1.f;
 constexpr V8 kPieceY = {0, 0, 2, 2, 4, 4, 6, 6}, kPieceZ = {0, 4, 0, 4, 0, 4, 0, 4};
 constexpr Lanes kSecond = {0, 0, 0, 0, -1, -1, -1, -1};
 constexpr V16 kPairZ = {0, 1, 2, 3, 4, 5, 6, 7, 0, 1, 2, 3, 4, 5, 6, 7},

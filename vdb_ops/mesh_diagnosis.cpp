@@ -52,6 +52,8 @@ public:
     }
 
 private:
+    void say(const char* line) { out_.emplace_back(line); }
+
     template <class... Values>
     void say(const char* format, Values... values) {
         char text[256];

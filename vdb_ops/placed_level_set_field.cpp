@@ -14,7 +14,6 @@ namespace {
 
 using openvdb::Coord;
 using openvdb::CoordBBox;
-constexpr int kLeaf = BlockSampler::kLeaf;
 
 /// Voxel (i, j, k) of a lattice lies at first + i step[0] + j step[1] + k step[2] of the grid.
 struct Frame {

@@ -18,6 +18,8 @@ template <class... Fns>
 struct Overloaded : Fns... {
     using Fns::operator()...;
 };
+template <class... Fns> // clang 14 does not deduce it by itself
+Overloaded(Fns...) -> Overloaded<Fns...>;
 
 /// Checks the lengths of one solid.
 struct Checker {

@@ -119,7 +119,8 @@ void BoundCheck::judge_surface(const TriMesh& mesh, double bound_m, std::span<co
     // Rims lie between samples: other points of the surface around those that are far.
     const std::size_t n_climbed = std::min(kClimbed, far.size());
     tbb::parallel_for(std::size_t{0}, n_climbed, [&](std::size_t i) {
-        auto& [negative, p] = far[i];
+        double& negative = far[i].first;
+        Vec3& p = far[i].second;
         if (-negative > reach_m || -negative < 0.5 * bound_m)
             return;
         double radius = kSurfaceSpacing * voxel_m_;
