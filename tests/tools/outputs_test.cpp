@@ -79,7 +79,7 @@ TEST_P(Stopping, EndsAProgramThatIsWaitedFor) {
          folder);
     // What has not ended long after the signal is killed: another exit code.
     const Finished said = run("PATH=$PWD/bin:$PATH timeout " + std::string(GetParam()) +
-                                  " -s INT -k 20 --preserve-status 0.5 taihu fit " TAIHU_DATA
+                                  " -s INT -k 20 --preserve-status 1.5 taihu fit " TAIHU_DATA
                                   "/measurements/rock1.csv --resamples 19 --report law.html",
                               folder.path());
     EXPECT_EQ(said.exit_code, 130);
