@@ -164,7 +164,9 @@ void Console::limit_memory() const {
     const double most = data_bytes() + *asked + kStack_bytes * n;
     if (most < static_cast<double>(data.rlim_cur)) // RLIM_INFINITY is the greatest number
         data.rlim_cur = static_cast<rlim_t>(most);
+#ifndef TAIHU_SANITIZED // whose own memory counts, too
     ::setrlimit(RLIMIT_DATA, &data);
+#endif
 }
 
 void Console::say_text(const std::string& line) const {

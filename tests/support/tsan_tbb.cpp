@@ -2,7 +2,11 @@
 // that a task runs after it was spawned, and that its end is waited for. These functions stand
 // before those of libtbb that tasks pass through, and tell it so. What then is reported are races
 // of ours.
+#include <array>
+#include <atomic>
+#include <cstdint>
 #include <cstdlib>
+#include <thread>
 
 #include <dlfcn.h>
 #include <sanitizer/tsan_interface.h>
@@ -27,10 +31,41 @@ Fn* hidden(const char* name) {
     return reinterpret_cast<Fn*>(found);
 }
 
+/// Tasks of a context that were spawned and have not ended. Libraries that are not built with the
+/// sanitizer count theirs off unseen, so who waits for them waits here, too.
+class Spawned {
+public:
+    void add() { n_.fetch_add(1, std::memory_order_relaxed); }
+    void end() {
+        __tsan_release(this);
+        n_.fetch_sub(1, std::memory_order_relaxed);
+    }
+    void wait() {
+        // Contexts share a number once in a while, and one may be waited for within its own task.
+        for (int i = 0; i < 100'000 && n_.load(std::memory_order_relaxed) > 0; ++i)
+            std::this_thread::yield();
+        __tsan_acquire(this);
+    }
+
+private:
+    std::atomic<long> n_{0}; // relaxed: is to order nothing by itself
+};
+
+Spawned& spawned(const task_group_context& context) {
+    static constexpr int kBits = 16;
+    static std::array<Spawned, 1 << kBits> by_context;
+    const auto address = reinterpret_cast<std::uintptr_t>(&context);
+    return by_context[address * 0x9e3779b97f4a7c15u >> (64 - kBits)];
+}
+
 /// Stands for a task that was spawned, until that is run.
 class Handed final : public task {
 public:
-    explicit Handed(task& inner) : inner_(&inner) { __tsan_release(this); }
+    Handed(task& inner, const task_group_context& context)
+        : inner_(&inner), spawned_(spawned(context)) {
+        spawned_.add();
+        __tsan_release(this);
+    }
 
 private:
     task* execute(execution_data& data) override {
@@ -43,19 +78,18 @@ private:
     task* run(Run&& inner) {
         __tsan_acquire(this);
         task* const next = inner(); // where it throws, cancel() comes after
+        spawned_.end();
         delete this;
         return next;
     }
     task* inner_;
+    Spawned& spawned_;
 };
 
-/// What was done by tasks is seen by who waited for them, be it that one threw: they counted
-/// themselves off.
+/// What was done by tasks is seen by who waited for them, be it that one threw.
 struct Waited {
-    wait_context& on;
-    ~Waited() {
-        __tsan_acquire(reinterpret_cast<char*>(&on) + sizeof(std::uint64_t)); // its counter
-    }
+    const task_group_context& on;
+    ~Waited() { spawned(on).wait(); }
 };
 
 /// The same of a function that may run in another thread.
@@ -89,13 +123,13 @@ namespace r1 {
 void spawn(task& t, task_group_context& context) {
     static auto* const real = hidden<void(task&, task_group_context&)>(
         "_ZN3tbb6detail2r15spawnERNS0_2d14taskERNS2_18task_group_contextE");
-    real(*new Handed(t), context);
+    real(*new Handed(t, context), context);
 }
 
 void spawn(task& t, task_group_context& context, d1::slot_id slot) {
     static auto* const real = hidden<void(task&, task_group_context&, d1::slot_id)>(
         "_ZN3tbb6detail2r15spawnERNS0_2d14taskERNS2_18task_group_contextEt");
-    real(*new Handed(t), context, slot);
+    real(*new Handed(t, context), context, slot);
 }
 
 void execute_and_wait(task& t, task_group_context& of_task, wait_context& waited,
@@ -104,14 +138,14 @@ void execute_and_wait(task& t, task_group_context& of_task, wait_context& waited
         hidden<void(task&, task_group_context&, wait_context&, task_group_context&)>(
             "_ZN3tbb6detail2r116execute_and_waitERNS0_2d14taskERNS2_18task_group_contextERNS2_12"
             "wait_contextES6_");
-    const Waited after{waited};
+    const Waited after{of_wait};
     real(t, of_task, waited, of_wait);
 }
 
 void wait(wait_context& waited, task_group_context& context) {
     static auto* const real = hidden<void(wait_context&, task_group_context&)>(
         "_ZN3tbb6detail2r14waitERNS0_2d112wait_contextERNS2_18task_group_contextE");
-    const Waited after{waited};
+    const Waited after{context};
     real(waited, context);
 }
 
