@@ -40,8 +40,8 @@ double growth(std::uint64_t n_first, std::uint64_t n) {
     }
     const std::size_t last = held_bytes();
     std::printf("held after %llu recipes %zu bytes, after %llu recipes %zu\n",
-                static_cast<unsigned long long>(n_first), first,
-                static_cast<unsigned long long>(n), last);
+                static_cast<unsigned long long>(n_first), first, static_cast<unsigned long long>(n),
+                last);
     return double(last) / double(first) - 1;
 }
 

@@ -131,9 +131,10 @@ TEST_F(Bake, VerticesHaveCurvatureAndDisplacement) {
 
 TEST_F(Bake, MapsAppearTogetherOrNotAtAll) {
     // Cancelled by its signal while it works, wherever that is.
-    const Finished said = run("timeout --preserve-status -s INT 1 taihu bake rock.vdb --levels 4 "
-                              "--max-error 0.3vox --size 4096 --ao-rays 64 --maps maps -o rock.glb",
-                              scratch_.path());
+    const Finished said =
+        run("timeout --foreground --preserve-status -s INT 1 taihu bake rock.vdb --levels 4 "
+            "--max-error 0.3vox --size 4096 --ao-rays 64 --maps maps -o rock.glb",
+            scratch_.path());
     EXPECT_EQ(said.exit_code, 130) << said.err;
     EXPECT_FALSE(std::filesystem::exists(scratch_ / "maps"));
     EXPECT_FALSE(std::filesystem::exists(scratch_ / "rock.glb"));

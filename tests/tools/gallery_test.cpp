@@ -103,7 +103,8 @@ TEST(Gallery, ReplacesAnEarlierOneAndNothingElse) {
 TEST(Gallery, StoppedItLeavesNothing) {
     const Scratch scratch; // the row takes some seconds
     const Finished stopped =
-        run("timeout --preserve-status -s INT 0.5 taihu gallery --only D20", scratch.path());
+        run("timeout --foreground --preserve-status -s INT 0.5 taihu gallery --only D20",
+            scratch.path());
     EXPECT_EQ(stopped.exit_code, 130) << stopped.err;
     EXPECT_TRUE(std::filesystem::is_empty(scratch.path()));
 }

@@ -94,9 +94,10 @@ TEST(Backstop, EndsWorkThatDoesNotLookUp) {
     const Scratch folder;
     // 1.3 million triangles are looked at for crossings without a look at signals; where that is
     // over within the second that it is given, the look before writing ends it.
-    const Finished said = run("timeout -s TERM --preserve-status 0.6 taihu shape boulder "
-                              "--subdivisions 8 -q -o x.glb",
-                              folder.path());
+    const Finished said =
+        run("timeout --foreground -s TERM --preserve-status 0.6 taihu shape boulder "
+            "--subdivisions 8 -q -o x.glb",
+            folder.path());
     EXPECT_EQ(said.exit_code, 143);
     // Nothing where the machine is so busy that the program has not begun.
     EXPECT_THAT(said.err, testing::AnyOf("", "taihu: stopped; no output was written\n"));
