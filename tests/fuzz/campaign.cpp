@@ -16,7 +16,6 @@
 #include <sys/mman.h>
 #include <sys/resource.h>
 #include <sys/wait.h>
-#include <tbb/global_control.h>
 #include <thread>
 #include <unistd.h>
 
@@ -134,7 +133,6 @@ Fate fate_of(const Job& job, std::uint64_t item, const std::filesystem::path& fo
     ::setrlimit(RLIMIT_CORE, &no_core);
     ::dup2(job.said[worker], STDERR_FILENO);
     limit_memory();
-    const tbb::global_control one(tbb::global_control::max_allowed_parallelism, 1); // after a fork
     const Scratch folder;
     for (std::uint64_t item = first; item < job.n; item += kWorkers) {
         std::ofstream("/proc/self/clear_refs") << 5; // the peak begins anew
