@@ -104,7 +104,13 @@ TEST_P(Bounds, KeepPiecesGenusAndLabels) {
 
 INSTANTIATE_TEST_SUITE_P(Rocks, Bounds,
                          testing::Combine(testing::Bool(), testing::Bool(),
-                                          testing::Values(0.1, 0.25, 1.)));
+                                          testing::Values(0.1, 0.25, 1.)),
+                         [](const auto& of) {
+                             const auto [rough, balance, bound_vox] = of.param;
+                             return std::string(rough ? "Rough" : "Exact") +
+                                    (balance ? "Balanced" : "") + "Within" +
+                                    std::to_string(std::lround(100 * bound_vox)) + "Percent";
+                         });
 
 TEST(BoundedSimplifier, TakesALevelSetForAFieldOfOnePrimitive) {
     const auto grid = level_set_of(exact_rock(), 1);

@@ -88,7 +88,8 @@ TEST_P(Stopping, EndsAProgramThatIsWaitedFor) {
 }
 
 // The signal goes to both, as from a terminal, or to taihu alone.
-INSTANTIATE_TEST_SUITE_P(Signal, Stopping, testing::Values("", "--foreground"));
+INSTANTIATE_TEST_SUITE_P(Signal, Stopping, testing::Values("", "--foreground"),
+                         [](const auto& to) { return *to.param ? "ToTaihu" : "ToBoth"; });
 
 TEST(Backstop, EndsWorkThatDoesNotLookUp) {
     const Scratch folder;

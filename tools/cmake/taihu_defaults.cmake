@@ -54,6 +54,6 @@ function(taihu_tests module)
       $<$<CXX_COMPILER_ID:GNU>:-Wno-array-bounds -Wno-stringop-overflow>)
   endif()
   add_dependencies(${module}_tests taihu_reader) # what they read, it reads for them
-  gtest_discover_tests(${module}_tests TEST_PREFIX ${module}/ DISCOVERY_MODE PRE_TEST
+  gtest_discover_tests(${module}_tests TEST_PREFIX ${module}/ DISCOVERY_MODE PRE_TEST NO_PRETTY_VALUES
     PROPERTIES LABELS unit TIMEOUT 300)
 endfunction()

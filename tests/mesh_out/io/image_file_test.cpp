@@ -65,7 +65,8 @@ TEST_P(PngChannels, ComeBackWithinAStepOfEightBits) {
             << i; // rounded to 8 bits, then held in single precision
     }
 }
-INSTANTIATE_TEST_SUITE_P(PngImage, PngChannels, testing::Values(1, 3, 4));
+INSTANTIATE_TEST_SUITE_P(PngImage, PngChannels, testing::Values(1, 3, 4),
+                         testing::PrintToStringParamName());
 
 TEST(PngImage, DataIsStoredWithoutACurve) {
     const Scratch folder;
