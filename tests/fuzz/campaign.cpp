@@ -28,7 +28,7 @@
 namespace taihu {
 namespace {
 
-constexpr double kMostSeconds = 10;
+constexpr double kMostSeconds = 10; ///< of processor time
 constexpr std::size_t kMostBytes = std::size_t{1} << 30, kWorkers = 2, kShown = 5;
 
 /// What became of a mutation; those from `crash` on must not be.
@@ -75,6 +75,19 @@ std::int64_t now_ms() {
     return std::chrono::duration_cast<std::chrono::milliseconds>(
                std::chrono::steady_clock::now().time_since_epoch())
         .count();
+}
+
+/// Processor time of this process and of those that it waited for: a machine that pauses makes
+/// nothing slow.
+double processor_s() {
+    double s = 0;
+    for (const int who : {RUSAGE_SELF, RUSAGE_CHILDREN}) {
+        rusage usage{};
+        ::getrusage(who, &usage);
+        for (const timeval& t : {usage.ru_utime, usage.ru_stime})
+            s += double(t.tv_sec) + 1e-6 * double(t.tv_usec);
+    }
+    return s;
 }
 
 /// A line of /proc/self/status, in bytes.
@@ -137,6 +150,7 @@ Fate fate_of(const Job& job, std::uint64_t item, const std::filesystem::path& fo
     for (std::uint64_t item = first; item < job.n; item += kWorkers) {
         std::ofstream("/proc/self/clear_refs") << 5; // the peak begins anew
         const std::size_t before = memory("VmHWM:");
+        const double before_s = processor_s();
         job.shared->since_ms[worker] = now_ms();
         job.shared->item[worker] = item;
         Fate fate = fate_of(job, item, folder.path());
@@ -144,7 +158,7 @@ Fate fate_of(const Job& job, std::uint64_t item, const std::filesystem::path& fo
             fate = chatter;
         if (fate < crash && memory("VmHWM:") > before + kMostBytes)
             fate = big;
-        if (fate < crash && now_ms() - job.shared->since_ms[worker] > 1000 * kMostSeconds)
+        if (fate < crash && processor_s() - before_s > kMostSeconds)
             fate = slow;
         job.shared->fates[item] = fate;
         if (fate >= crash)
@@ -185,7 +199,7 @@ void watch(const Job& job, std::size_t worker, std::map<Fate, std::size_t>& show
         int status = 0;
         bool killed = false;
         while (::waitpid(pid, &status, WNOHANG) == 0) {
-            if (now_ms() - job.shared->since_ms[worker] > 1500 * kMostSeconds && !killed)
+            if (now_ms() - job.shared->since_ms[worker] > 12000 * kMostSeconds && !killed)
                 killed = ::kill(pid, SIGKILL) == 0;
             std::this_thread::sleep_for(std::chrono::milliseconds(5));
         }

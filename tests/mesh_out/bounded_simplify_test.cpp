@@ -2,7 +2,9 @@
 
 #include <algorithm>
 #include <atomic>
+#include <cmath>
 #include <limits>
+#include <string>
 
 #include <gtest/gtest.h>
 #include <tbb/global_control.h>
@@ -102,15 +104,15 @@ TEST_P(Bounds, KeepPiecesGenusAndLabels) {
             }
 }
 
+std::string name_of(const testing::TestParamInfo<Bounds::ParamType>& test) {
+    const auto& [rough, balance, bound_vox] = test.param;
+    return std::string(rough ? "Rough" : "Exact") + (balance ? "Balanced" : "") + "Within" +
+           std::to_string(std::lround(100 * bound_vox)) + "Percent";
+}
 INSTANTIATE_TEST_SUITE_P(Rocks, Bounds,
                          testing::Combine(testing::Bool(), testing::Bool(),
                                           testing::Values(0.1, 0.25, 1.)),
-                         [](const auto& of) {
-                             const auto [rough, balance, bound_vox] = of.param;
-                             return std::string(rough ? "Rough" : "Exact") +
-                                    (balance ? "Balanced" : "") + "Within" +
-                                    std::to_string(std::lround(100 * bound_vox)) + "Percent";
-                         });
+                         name_of);
 
 TEST(BoundedSimplifier, TakesALevelSetForAFieldOfOnePrimitive) {
     const auto grid = level_set_of(exact_rock(), 1);
