@@ -26,7 +26,8 @@ sem_t g_asked;
 std::atomic_flag g_ending;
 
 void on_signal(int signal) {
-    g_signal = signal;
+    int none = 0;
+    g_signal.compare_exchange_strong(none, signal);
     ::sem_post(&g_asked);
 }
 
@@ -43,8 +44,8 @@ void* end_soon(void*) {
     ::_exit(128 + g_signal);
 }
 
-/// A small thread: one that cannot be had is missed by nobody who waits.
-void start_backstop() {
+/// A small thread. False: it cannot be had.
+bool start_backstop() {
     pthread_attr_t small;
     pthread_t thread;
     sigset_t all, before;
@@ -54,9 +55,10 @@ void start_backstop() {
     ::pthread_attr_init(&small);
     ::pthread_attr_setdetachstate(&small, PTHREAD_CREATE_DETACHED);
     ::pthread_attr_setstacksize(&small, std::size_t{256} << 10);
-    ::pthread_create(&thread, &small, end_soon, nullptr);
+    const bool started = ::pthread_create(&thread, &small, end_soon, nullptr) == 0;
     ::pthread_attr_destroy(&small);
     ::pthread_sigmask(SIG_SETMASK, &before, nullptr);
+    return started;
 }
 
 /// What this process has of data and stacks by now.
@@ -81,10 +83,11 @@ void claim_the_end() {
 }
 
 void catch_stop_signals() {
-    start_backstop();
     struct sigaction action {};
     action.sa_handler = on_signal;
-    action.sa_flags = static_cast<int>(SA_RESETHAND); // a second Ctrl-C kills
+    // Signals often come twice, as timeout sends them to the program and to its group: a second one
+    // kills only where nothing else ends what does not look up.
+    action.sa_flags = start_backstop() ? 0 : static_cast<int>(SA_RESETHAND);
     sigaction(SIGINT, &action, nullptr);
     sigaction(SIGTERM, &action, nullptr);
     // A closed pipe and a file size limit are errors of the call that meets them, not deaths.
