@@ -94,6 +94,8 @@ void tell(const CarveArgs& args, const LawHoles& holes, std::size_t n_unresolved
         "({:.3g} m^3)",
         where, cleaned.n_pieces, cleaned.n_pieces_removed, cleaned.removed_m3, cleaned.n_bubbles,
         cleaned.n_bubbles_filled, cleaned.filled_m3);
+    if (const auto line = crumbled_line(cleaned))
+        console.say("{}: {}", where, *line);
     if (cleaned.foot)
         console.say("{}: {}", where, foot_line(cleaned));
     console.say("{}: porosity {:.4f} as carved, {:.4f} once cleaned", where, carved.porosity(),

@@ -22,6 +22,15 @@ std::string foot_line(const CleanCounts& counts) {
            rounded(foot.contact_m2) + " m^2";
 }
 
+std::optional<std::string> crumbled_line(const CleanCounts& counts) {
+    const double share = counts.removed_m3 / counts.before_m3;
+    if (!(share > 0.05))
+        return std::nullopt;
+    return "but a share of " + rounded(share) +
+           " of the solid was in these pieces; where its walls are thinner than a voxel, a smaller "
+           "voxel keeps them";
+}
+
 std::vector<std::string> cleaning_lines(const CleanCounts& counts) {
     std::vector<std::string> lines;
     if (counts.n_necked > 0)
@@ -33,6 +42,8 @@ std::vector<std::string> cleaning_lines(const CleanCounts& counts) {
             " pieces removed (" + rounded(counts.removed_m3) + " m^3), " +
             std::to_string(counts.n_bubbles_filled) + " of " + std::to_string(counts.n_bubbles) +
             " sealed bubbles filled (" + rounded(counts.filled_m3) + " m^3)");
+    if (const auto line = crumbled_line(counts))
+        lines.push_back(*line);
     if (counts.foot)
         lines.push_back(foot_line(counts));
     return lines;
@@ -137,7 +148,7 @@ CleanResult clean(const openvdb::FloatGrid& solid, const CleanSettings& settings
         components.mark(choice.filled, filled);
     }
     const auto everywhere = openvdb::CoordBBox::inf();
-    const double before_m3 = volume_m3(solid);
+    const double before_m3 = result.before_m3 = volume_m3(solid);
     double now_m3 = before_m3;
     if (result.n_pieces_removed > 0) {
         result.solid = flip(solid, removed, everywhere, progress);

@@ -33,6 +33,7 @@ struct CleanCounts {
     std::size_t n_pieces_removed = 0;
     std::size_t n_bubbles = 0; ///< found, once the pieces are gone
     std::size_t n_bubbles_filled = 0;
+    double before_m3 = 0;     ///< volume that pieces and bubbles were looked for in
     double removed_m3 = 0;    ///< volume of the pieces that went
     double filled_m3 = 0;     ///< volume of the bubbles that were filled
     std::optional<Foot> foot; ///< when it was asked for; cut_m is of all cuts together
@@ -50,6 +51,9 @@ std::shared_ptr<const Field> cleaned_field(std::shared_ptr<const Field> field,
 
 /// What it stands on, for people; of counts that have a foot.
 std::string foot_line(const CleanCounts& counts);
+
+/// For people, where more than a twentieth of the solid went as loose pieces.
+std::optional<std::string> crumbled_line(const CleanCounts& counts);
 
 /// A line for people on each kind of thing that was removed or filled; none where nothing was.
 std::vector<std::string> cleaning_lines(const CleanCounts& counts);

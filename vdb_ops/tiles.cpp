@@ -162,6 +162,7 @@ private:
         twice.expand((filling ? reach : 0) + (removing ? reach : 0));
         openvdb::FloatGrid::Ptr grid = made(twice);
         double before_m3 = volume_m3(*grid, box);
+        result_.cleaned->before_m3 += before_m3;
         if (removing) {
             grid = flip(*grid, removed_, once, progress_);
             const double now_m3 = volume_m3(*grid, box);

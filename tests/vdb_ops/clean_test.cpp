@@ -2,6 +2,7 @@
 
 #include <numbers>
 
+#include <gmock/gmock.h>
 #include <tbb/global_control.h>
 
 #include "stats/core/rng.h"
@@ -42,6 +43,15 @@ TEST(Clean, KeepsAsManyAsAskedFor) {
     const CleanResult all = clean(*three, {.n_pieces = std::nullopt});
     EXPECT_EQ(all.n_pieces_removed, 0u);
     EXPECT_EQ(grid_hash(*all.solid), grid_hash(*three));
+}
+
+TEST(Clean, SaysWhenMuchOfTheSolidFellOff) {
+    const auto three = balls({{{}, 1}, {{2, 0, 0}, 0.5}, {{-2, 0, 0}, 0.4}});
+    const auto said = crumbled_line(clean(*three)); // 0.189 of 1.189
+    ASSERT_TRUE(said);
+    EXPECT_THAT(*said, testing::HasSubstr("a share of 0.159 of the solid"));
+    EXPECT_FALSE(crumbled_line(clean(*three, {.n_pieces = std::nullopt})));
+    EXPECT_FALSE(crumbled_line(clean(*balls({{{}, 1}, {{2, 0, 0}, 0.3}}))));
 }
 
 TEST(Clean, FillsSealedBubblesAndKeepsOpenHoles) {
