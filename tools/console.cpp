@@ -77,7 +77,9 @@ int stop_signal() {
 
 void claim_the_end() {
     if (g_ending.test_and_set()) {
-        ::sleep(3); // by then the other has ended it, unless it fails in doing so
+        // By then the other has ended it, unless it fails in doing so. Signals wake this one early.
+        for (unsigned left_s = 3; left_s > 0;)
+            left_s = ::sleep(left_s);
         ::_exit(70);
     }
 }
