@@ -28,7 +28,7 @@
 namespace taihu {
 namespace {
 
-constexpr double kMostSeconds = 10; ///< of processor time
+constexpr double kMostSeconds = 10; ///< of processor time, and twice in a row by the clock
 constexpr std::size_t kMostBytes = std::size_t{1} << 30, kWorkers = 2, kShown = 5;
 
 /// What became of a mutation; those from `crash` on must not be.
@@ -139,6 +139,33 @@ Fate fate_of(const Job& job, std::uint64_t item, const std::filesystem::path& fo
     }
 }
 
+/// Reads one, and says what became of it by its memory and time. By the clock a read is slow when
+/// it is slow once more: it may have waited for others the first time, or the machine paused.
+Fate judged_fate(const Job& job, std::size_t worker, std::uint64_t item,
+                 const std::filesystem::path& folder) {
+    for (bool again = false;; again = true) {
+        std::ofstream("/proc/self/clear_refs") << 5; // the peak begins anew
+        const std::size_t before = memory("VmHWM:");
+        const double before_s = processor_s();
+        const std::int64_t start_ms = now_ms();
+        job.shared->since_ms[worker] = start_ms;
+        job.shared->item[worker] = item;
+        const Fate fate = fate_of(job, item, folder);
+        if (fate >= crash)
+            return fate;
+        if (::lseek(STDERR_FILENO, 0, SEEK_CUR) > 0)
+            return chatter;
+        if (memory("VmHWM:") > before + kMostBytes)
+            return big;
+        if (processor_s() - before_s > kMostSeconds)
+            return slow;
+        if (double(now_ms() - start_ms) <= 1000 * kMostSeconds)
+            return fate;
+        if (again)
+            return slow;
+    }
+}
+
 /// Reads every kWorkers'th mutation from `first` on. What is said stays in job.said after the last
 /// item that said anything.
 [[noreturn]] void work(const Job& job, std::size_t worker, std::uint64_t first) {
@@ -148,18 +175,7 @@ Fate fate_of(const Job& job, std::uint64_t item, const std::filesystem::path& fo
     limit_memory();
     const Scratch folder;
     for (std::uint64_t item = first; item < job.n; item += kWorkers) {
-        std::ofstream("/proc/self/clear_refs") << 5; // the peak begins anew
-        const std::size_t before = memory("VmHWM:");
-        const double before_s = processor_s();
-        job.shared->since_ms[worker] = now_ms();
-        job.shared->item[worker] = item;
-        Fate fate = fate_of(job, item, folder.path());
-        if (::lseek(STDERR_FILENO, 0, SEEK_CUR) > 0 && fate < crash)
-            fate = chatter;
-        if (fate < crash && memory("VmHWM:") > before + kMostBytes)
-            fate = big;
-        if (fate < crash && processor_s() - before_s > kMostSeconds)
-            fate = slow;
+        const Fate fate = judged_fate(job, worker, item, folder.path());
         job.shared->fates[item] = fate;
         if (fate >= crash)
             break; // the watcher shows what was said, and starts the next one
