@@ -330,10 +330,10 @@ std::vector<std::string> faults(const Certificate& certificate) {
     add_count(out, certificate.n_misplaced_pieces, "piece that faces the wrong way",
               "pieces that face the wrong way");
     // Of a mesh that is open or twisted the volume says nothing.
-    if (out.empty() && !(certificate.volume_m3 > 0)) {
+    if (out.empty() && !(certificate.volume_m3 > 0 && std::isfinite(certificate.volume_m3))) {
         char text[64];
-        std::snprintf(text, sizeof text, "a volume of %.6g m^3, not above 0",
-                      certificate.volume_m3);
+        std::snprintf(text, sizeof text, "a volume of %.6g m^3, not %s", certificate.volume_m3,
+                      std::isfinite(certificate.volume_m3) ? "above 0" : "finite");
         out.emplace_back(text);
     }
     return out;

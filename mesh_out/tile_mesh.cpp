@@ -328,7 +328,7 @@ public:
 
     /// Whether something is inside in the first layer of a tile along an axis.
     bool is_inside_at(const Tile& tile, int axis) const {
-        const auto grid = read_tile(folder_, tile);
+        const auto grid = read_tile(folder_, tile, set_.lattice);
         for (auto value = grid->tree().cbeginValueAll(); value; ++value)
             if (value.getValue() < 0 && value.getBoundingBox().min()[axis] <= tile.box.min()[axis])
                 return true;
@@ -337,11 +337,7 @@ public:
 
 private:
     void add(const Tile& tile, const CoordBBox& box, openvdb::FloatGrid& to) const {
-        const auto grid = read_tile(folder_, tile);
-        const Lattice own = lattice_of(*grid), ours = lattice_of(to);
-        if (own.voxel_m != ours.voxel_m || own.half_width_vox != ours.half_width_vox)
-            throw Error(Fault::bad_input, tile.file + ": has another voxel or half band than the "
-                                                      "set; write the tiles again");
+        const auto grid = read_tile(folder_, tile, set_.lattice);
         auto& tree = grid->tree();
         auto inside = tree.cbeginValueAll();
         inside.setMaxDepth(inside.getLeafDepth() - 1);

@@ -4,6 +4,7 @@
 #include "mesh_out/field_distance.h"
 #include "mesh_out/surface_distance.h"
 #include "stats/core/error.h"
+#include "stats/core/of_file.h"
 #include "tools/solid_files.h"
 #include "vdb_ops/placed_level_set_field.h"
 #include "vdb_ops/rasterize.h"
@@ -87,7 +88,9 @@ bool tell_distance(const TriMesh& level, const Reference& to, const std::string&
                    nlohmann::ordered_json& json) {
     report_stage(console.progress, "measuring");
     const FieldDistance d = to.probe ? field_distance(level, *to.probe, to.mesh, to.spacing_m, kFar)
-                                     : as_field(two_sided_distance(level, to.mesh, to.spacing_m));
+                                     : as_field(of_file(where, [&] {
+                                           return two_sided_distance(level, to.mesh, to.spacing_m);
+                                       }));
     const bool near = !to.within_m || d.max_m <= *to.within_m;
     json["distance"] = {{"against", against.string()},
                         {"max_m", d.max_m},

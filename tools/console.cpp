@@ -1,7 +1,10 @@
 #include "tools/console.h"
 
+#include <cerrno>
+#include <climits>
 #include <csignal>
 #include <cstdio>
+#include <cstring>
 #include <ctime>
 #include <fstream>
 #include <pthread.h>
@@ -40,7 +43,8 @@ void* end_soon(void*) {
     ::nanosleep(&kPatience, nullptr);
     claim_the_end();
     discard_temporaries();
-    std::fprintf(stderr, "%staihu: %s\n", ::isatty(STDERR_FILENO) ? "\r\033[K" : "", kStopped);
+    std::fprintf(stderr, "%staihu: %s\n", ::isatty(STDERR_FILENO) ? "\r\033[K" : "",
+                 stopped_text());
     ::_exit(128 + g_signal);
 }
 
@@ -75,6 +79,11 @@ int stop_signal() {
     return g_signal;
 }
 
+const char* stopped_text() {
+    return any_published() ? "stopped; what was written before is whole"
+                           : "stopped; no output was written";
+}
+
 void claim_the_end() {
     if (g_ending.test_and_set()) {
         // By then the other has ended it, unless it fails in doing so. Signals wake this one early.
@@ -90,8 +99,12 @@ void catch_stop_signals() {
     // Signals often come twice, as timeout sends them to the program and to its group: a second one
     // kills only where nothing else ends what does not look up.
     action.sa_flags = start_backstop() ? 0 : static_cast<int>(SA_RESETHAND);
-    sigaction(SIGINT, &action, nullptr);
-    sigaction(SIGTERM, &action, nullptr);
+    for (const int signal : {SIGINT, SIGTERM, SIGHUP}) {
+        struct sigaction before {};
+        sigaction(signal, nullptr, &before);
+        if (before.sa_handler != SIG_IGN) // as nohup and shells ask for
+            sigaction(signal, &action, nullptr);
+    }
     // A closed pipe and a file size limit are errors of the call that meets them, not deaths.
     std::signal(SIGPIPE, SIG_IGN);
     std::signal(SIGXFSZ, SIG_IGN);
@@ -137,6 +150,7 @@ CLI::App* Console::verb(CLI::App& app, const std::string& name, const std::strin
     verb->add_option("--memory", memory,
                      "Refuse what would need more, as 4GB, and end what takes more [what the "
                      "machine has left]")
+        ->check([](const std::string& text) { return std::string(text.empty() ? "is empty" : ""); })
         ->group(group);
     verb->footer("\nExamples:\n" + examples);
     return verb;
@@ -161,12 +175,14 @@ void Console::require_memory(double n, double bytes_each, const std::string& rem
 /// holds already, and the stacks of its threads, of which little is ever touched.
 void Console::limit_memory() const {
     constexpr double kStack_bytes = 8 << 20;
-    const auto asked = memory_bytes();
+    // What is left may come back, as other programs end: so much is tried at least.
+    constexpr double kLeast_bytes = 512e6;
+    const double allowed = memory_bytes().value_or(std::max(kLeast_bytes, memory_limit_bytes()));
     rlimit data{};
-    if (!asked || ::getrlimit(RLIMIT_DATA, &data) != 0)
+    if (::getrlimit(RLIMIT_DATA, &data) != 0)
         return;
     const int n = n_threads > 0 ? n_threads : tbb::info::default_concurrency();
-    const double most = data_bytes() + *asked + kStack_bytes * n;
+    const double most = data_bytes() + allowed + kStack_bytes * n;
     if (most < static_cast<double>(data.rlim_cur)) // RLIM_INFINITY is the greatest number
         data.rlim_cur = static_cast<rlim_t>(most);
 #ifndef TAIHU_SANITIZED // whose own memory counts, too
@@ -211,13 +227,19 @@ void Console::may_write(const std::filesystem::path& path,
                     path.string() + ": there is no folder " + folder.string() + "; make it first");
     if (fs::is_directory(path, ignored))
         throw Error(Fault::io, path.string() + ": is a folder; name a file");
+    if (path.filename().string().size() > NAME_MAX)
+        throw Error(Fault::io, path.string() + ": a name of more than " + std::to_string(NAME_MAX) +
+                                   " bytes; choose a shorter one");
+    if (::access(folder.c_str(), W_OK | X_OK) != 0)
+        throw Error(Fault::io, path.string() + ": cannot write: " + std::strerror(errno) +
+                                   "; check the rights of its folder");
     for (const fs::path& other : others)
         if (!other.empty() &&
             fs::weakly_canonical(other, ignored) == fs::weakly_canonical(path, ignored))
             throw Error(Fault::bad_argument,
                         path.string() +
                             ": is also read or written by this command; choose another name");
-    if (no_clobber && std::filesystem::exists(path))
+    if (no_clobber && fs::exists(fs::symlink_status(path, ignored)))
         throw Error(Fault::io,
                     path.string() + ": exists; choose another name, or drop --no-clobber");
 }

@@ -15,11 +15,11 @@
 #include <tbb/task_arena.h>
 
 #include "stats/core/progress.h"
+#include "stats/core/replacing.h"
 
 namespace taihu {
 
-/// Stages and percent on a terminal's stderr; silent anywhere else. Cancelled by SIGINT and
-/// SIGTERM.
+/// Stages and percent on a terminal's stderr; silent anywhere else. Cancelled by signals.
 class TerminalProgress final : public Progress {
 public:
     explicit TerminalProgress(bool visible) : visible_(visible) {}
@@ -53,6 +53,7 @@ struct Console {
     template <class Run>
     void within_limits(Run&& run) const {
         limit_memory();
+        const OutputRules rules(no_clobber);
         if (n_threads == 0)
             return run();
         const auto n = static_cast<std::size_t>(n_threads);
@@ -98,9 +99,11 @@ inline constexpr int kSaysNo = 3;
 
 /// The signal that asked to stop, or 0.
 int stop_signal();
-/// Let SIGINT and SIGTERM cancel instead of kill; what has not ended a second later is ended.
+/// Let SIGINT, SIGTERM and SIGHUP cancel instead of kill, unless they are ignored; what has not
+/// ended a second later is ended.
 void catch_stop_signals();
-inline constexpr const char* kStopped = "stopped; no output was written";
+/// What is said then.
+const char* stopped_text();
 /// Of threads that end the program the first goes on; others wait for the end here.
 void claim_the_end();
 

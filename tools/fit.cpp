@@ -311,7 +311,8 @@ void check_outputs(const FitArgs& args, const Console& console) {
     for (const auto& out : {args.out, args.report})
         for (const auto& file : args.files)
             if (!out.empty())
-                console.may_write(out, {file, out == args.out ? args.report : args.out});
+                console.may_write(out,
+                                  {file, args.expect, out == args.out ? args.report : args.out});
 }
 
 void run(FitArgs& args, const Console& console) {

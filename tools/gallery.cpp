@@ -78,14 +78,30 @@ private:
     fs::path before_;
 };
 
-/// Whether a folder is an earlier gallery, which may be replaced.
-bool is_gallery(const fs::path& folder) {
+/// \throws Error io: a folder has other files than those of an earlier gallery, which may go.
+void require_gallery(const fs::path& folder) {
     std::error_code ignored;
-    return fs::is_regular_file(folder / kPage, ignored) &&
-           read_file(folder / kPage).find(kGalleryMark) != std::string::npos;
+    if (!fs::is_regular_file(folder / kPage, ignored) ||
+        read_file(folder / kPage).find(kGalleryMark) == std::string::npos)
+        throw Error(Fault::io, folder.string() + ": a folder with other files; choose a new one "
+                                                 "for the gallery");
+    std::set<fs::path> known = {kPage};
+    for (const GalleryText& text : gallery_texts())
+        for (const GalleryEntry& e : text.entries) {
+            for (const auto& [name, bytes] : e.files)
+                known.insert(fs::path(e.row) / name);
+            for (const GalleryPicture& p : e.pictures)
+                known.insert(fs::path(e.row) / p.file);
+        }
+    for (const auto& entry : fs::recursive_directory_iterator(folder))
+        if (!entry.is_directory() && !known.count(entry.path().lexically_relative(folder)))
+            throw Error(Fault::io, entry.path().string() +
+                                       ": is not of the gallery, which would replace its folder; "
+                                       "move it, or choose a new folder");
 }
 
-/// Before any work: whether the folder can be made, and nothing of others would go.
+/// Before any work, and again after it: whether the folder can be made, and nothing of others would
+/// go.
 void check_output(const fs::path& out, const Console& console) {
     std::error_code failed;
     if (!out.has_filename())
@@ -98,9 +114,8 @@ void check_output(const fs::path& out, const Console& console) {
     if (console.no_clobber)
         throw Error(Fault::io,
                     out.string() + ": exists; choose another name, or drop --no-clobber");
-    if (!fs::is_empty(out) && !is_gallery(out))
-        throw Error(Fault::io, out.string() + ": a folder with other files; choose a new one for "
-                                              "the gallery");
+    if (!fs::is_empty(out))
+        require_gallery(out);
 }
 
 /// Runs an entry's commands in the current folder. Returns it with its figures.
@@ -175,6 +190,7 @@ void run(const GalleryArgs& args, const Console& console) {
     }
     write_file(work.path() / kPage, format_gallery(made));
     check_cancelled(console.progress);
+    check_output(args.out, console);
     work.publish();
     const fs::path page = args.out / kPage;
     console.say("{}: {} rows, {} pictures", page.string(), n_entries, n_pictures);

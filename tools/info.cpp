@@ -20,8 +20,8 @@ using Json = nlohmann::ordered_json;
 constexpr std::size_t kMostJsonBytes = std::size_t{16} << 20,
                       kMostTableBytes = std::size_t{1} << 30;
 
-Json vdb_info(const std::filesystem::path& path) {
-    const VdbFile file = read_vdb(path);
+Json vdb_info(const std::filesystem::path& path, Progress* progress) {
+    const VdbFile file = read_vdb(path, progress);
     const Lattice lattice = lattice_of(*file.solid);
     const openvdb::CoordBBox box = file.solid->evalActiveVoxelBoundingBox();
     Json json = {{"kind", file.tile.empty() ? "level set" : "tile of a level set"}};
@@ -114,7 +114,7 @@ void run(const SolidOptions& options, const Console& console) {
     const std::string extension = options.path.extension().string();
     Json json = {{"file", options.path.string()}};
     if (is_vdb(options.path))
-        json.update(vdb_info(options.path));
+        json.update(vdb_info(options.path, console.progress));
     else if (extension == ".json")
         json.update(json_info(options.path));
     else if (extension == ".csv")
@@ -128,7 +128,7 @@ void run(const SolidOptions& options, const Console& console) {
     if (json.contains("recipe") &&
         json["recipe"].is_string()) { // text in the file, an object for people and programs
         const std::string text = json["recipe"].get<std::string>();
-        json["recipe"] = recipe_solid(text) ? Json::parse(text) : Json(nullptr);
+        json["recipe"] = recipe_solid(text) ? parse_ordered_json(text, "recipe") : Json(nullptr);
     }
     if (console.json)
         return console.result(json);

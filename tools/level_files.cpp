@@ -156,6 +156,10 @@ void LevelFiles::add_options(CLI::App& verb) {
 
 void LevelFiles::check(const std::filesystem::path& input, const Console& console) {
     if (split) {
+        if (out.empty())
+            throw Error(Fault::bad_argument, "-o: is empty; name a folder");
+        if (!out.has_filename()) // without the slash at its end
+            out = out.parent_path();
         if (out.has_extension())
             throw Error(Fault::bad_argument,
                         out.string() + ": --split writes a folder; name one without extension");

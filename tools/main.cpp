@@ -1,4 +1,5 @@
 // The command `taihu`: verbs over files. Parses, calls, prints; the work is in the modules.
+#include <cerrno>
 #include <cstdio>
 #include <exception>
 #include <new>
@@ -30,11 +31,19 @@ int fail_foreign(const std::exception& e) {
     const std::string what = e.what();
     if (dynamic_cast<const std::bad_alloc*>(&e))
         return fail(kFailed,
-                    "out of memory; use a larger voxel, fewer holes or a greater --memory");
+                    "out of memory; use a larger voxel, fewer holes or smaller files, or a greater "
+                    "--memory");
     if (what.starts_with("pthread_create") || dynamic_cast<const std::system_error*>(&e))
         return fail(kFailed,
                     what + "; check paths and rights, free memory, or use fewer --threads");
     return fail(kBug, "internal error: " + what + "; please report it");
+}
+
+/// The end of a run that went well, if all that was printed arrived. A reader may close its pipe.
+int end(int code) {
+    if (std::fflush(stdout) == 0 && std::ferror(stdout) == 0)
+        return code;
+    return errno == EPIPE ? code : fail(kFailed, "stdout: cannot write; check where it goes");
 }
 
 /// For what is thrown where nobody can catch it, as in a thread of TBB that cannot start another.
@@ -142,20 +151,20 @@ int run(int argc, char** argv) {
     try {
         app.parse(argc, argv);
     } catch (const CLI::CallForHelp& e) {
-        return app.exit(e);
+        return end(app.exit(e));
     } catch (const CLI::CallForVersion& e) {
-        return app.exit(e);
+        return end(app.exit(e));
     } catch (const CLI::RuntimeError& e) { // a verb's own exit code, such as check's 3
         progress.reset();
         console.show_said();
-        return e.get_exit_code();
+        return end(e.get_exit_code());
     } catch (const CLI::ParseError& e) {
         return usage_error(app, argc, argv, e);
     } catch (const Error& e) {
         progress.reset();
         claim_the_end();
         if (e.fault() == Fault::cancelled && stop_signal() != 0)
-            return fail(kSignalled + stop_signal(), kStopped);
+            return fail(kSignalled + stop_signal(), stopped_text());
         return fail(e.fault() == Fault::bad_argument ? kUsage : kFailed, e.what());
     } catch (const std::exception& e) {
         progress.reset();
@@ -164,7 +173,7 @@ int run(int argc, char** argv) {
     }
     progress.reset();
     console.show_said();
-    return kDone;
+    return end(kDone);
 }
 
 } // namespace

@@ -5,6 +5,7 @@
 #include "mesh_out/extract.h"
 #include "stats/boolean_model.h"
 #include "stats/core/error.h"
+#include "stats/core/of_file.h"
 #include "stats/io/law_file.h"
 #include "stats/number_detail.h"
 #include "tools/measure_report.h"
@@ -170,7 +171,7 @@ void run(const MeasureArgs& args, const Console& console) {
         base = measured(args.file, args.base, console);
     report_stage(console.progress, "measuring");
     const Certificate& c = it.certificate;
-    const double hull_m3 = hull_volume_m3(it.mesh);
+    const double hull_m3 = of_file(where, [&] { return hull_volume_m3(it.mesh); });
     const Vec3 size = c.box.size();
     nlohmann::ordered_json json = {{"file", where},
                                    {"volume_m3", it.volume_m3},

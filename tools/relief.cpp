@@ -7,6 +7,7 @@
 #include "mesh_out/io/image_file.h"
 #include "stats/core/error.h"
 #include "stats/core/file_set.h"
+#include "stats/core/of_file.h"
 #include "stats/core/text.h"
 #include "stats/number_detail.h"
 #include "tools/bump_files.h"
@@ -166,7 +167,8 @@ PhotoRoughness look_at(const ReliefArgs& args, const Console& console) {
         s.azimuth_deg = angle_deg("--light-azimuth", args.light_azimuth);
     if (!args.light_elevation.empty())
         s.elevation_deg = angle_deg("--light-elevation", args.light_elevation);
-    const PhotoRoughness seen = photo_roughness(photo, s);
+    const PhotoRoughness seen =
+        of_file(args.from.string(), [&] { return photo_roughness(photo, s); });
     tell(args.from.string(), seen.roughness, console);
     console.say("{}: light from {} deg ({}) and {} deg above the stone; contrast along it {} times "
                 "that across",

@@ -154,6 +154,8 @@ std::vector<std::string> render_turn(const RenderArgs& args, const TriMesh& mesh
                         std::to_string(rows) +
                         " pictures is larger than 16384 pixels; use a smaller --size, or # in the "
                         "name for a file each");
+    for (int i = 0; apart && i < n; ++i)
+        console.may_write(numbered(args.out, i), {args.relief, args.grain});
     std::optional<FileSet> pictures; // of one folder, whatever else is in it
     if (apart)
         pictures.emplace(args.out.parent_path());
@@ -167,7 +169,6 @@ std::vector<std::string> render_turn(const RenderArgs& args, const TriMesh& mesh
         const Image image = render(mesh, view, console.progress);
         if (apart) {
             const std::filesystem::path file = numbered(args.out, i);
-            console.may_write(file);
             pictures->add_by([&](const std::filesystem::path& folder) {
                 write_image(folder / file.filename(), image);
             });
@@ -207,7 +208,7 @@ void check_options(const RenderArgs& args) {
 
 void run(RenderArgs& args, const Console& console) {
     check_options(args);
-    console.may_write(args.out);
+    console.may_write(args.out, {args.relief, args.grain});
     if (args.out.extension() != ".png" && args.out.extension() != ".exr")
         throw Error(Fault::unsupported,
                     args.out.string() + ": not a picture format; use .png or .exr");

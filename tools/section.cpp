@@ -200,8 +200,10 @@ void run(SectionArgs args, const Console& console) {
     if (args.out.empty() && !has_photos)
         throw Error(Fault::bad_argument,
                     "section: nothing to write; give -o profiles.csv, --photos DIR, or both");
+    if (!args.out.empty() && args.out.extension() != ".csv")
+        throw Error(Fault::unsupported, args.out.string() + ": profiles are a table; name a .csv");
     if (!args.out.empty())
-        console.may_write(args.out);
+        console.may_write(args.out, {args.solid.path, args.base, args.holes});
     std::optional<FileSet> photos;
     if (has_photos) {
         check_folder(args, console);

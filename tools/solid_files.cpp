@@ -6,6 +6,7 @@
 #include "mesh_out/io/relief_file.h"
 #include "stats/core/error.h"
 #include "stats/core/file.h"
+#include "stats/core/of_file.h"
 #include "stats/core/sha256.h"
 #include "vdb_ops/estimate.h"
 #include "vdb_ops/level_set_box.h"
@@ -143,12 +144,14 @@ Solid read_solid(const SolidOptions& options, const Console& console, Surfaces s
         VoxelizeSettings settings;
         settings.close = options.close_settings();
         const Box box = bounds(mesh);
-        settings.voxel_m = options.voxel.empty()
-                               ? voxel_for(box, options.dim.value_or(kDefaultDim))
-                               : length_m("--voxel", options.voxel, {0, box.longest()});
+        settings.voxel_m =
+            options.voxel.empty()
+                ? of_file(where, [&] { return voxel_for(box, options.dim.value_or(kDefaultDim)); })
+                : length_m("--voxel", options.voxel, {0, box.longest()});
         settings.memory_bytes = console.memory_bytes();
         report_stage(console.progress, "voxelizing");
-        VoxelizeResult result = voxelize(mesh, where, settings, console.progress);
+        VoxelizeResult result =
+            of_file(where, [&] { return voxelize(mesh, where, settings, console.progress); });
         solid.grid = result.solid;
         solid.field = result.field;
         solid.found = result.diagnosis.lines(settings.voxel_m);

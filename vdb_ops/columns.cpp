@@ -7,10 +7,14 @@
 #include <tbb/blocked_range.h>
 #include <tbb/parallel_for.h>
 
+#include "stats/core/error.h"
+#include "vdb_ops/estimate.h"
 #include "vdb_ops/rounding_detail.h"
 
 namespace taihu {
 namespace {
+
+constexpr double kColumn_bytes = 60; // at the peak: its count, and two crossings in most
 
 /// A face's edge at height y.
 struct Cut {
@@ -55,6 +59,12 @@ Columns::Columns(const ClosedMesh& mesh, const std::vector<Vec3>& points,
                  const openvdb::CoordBBox& box)
     : x0_(box.min().x()), y0_(box.min().y()), nx_(box.dim().x()), ny_(box.dim().y()) {
     const std::size_t n_columns = static_cast<std::size_t>(nx_) * static_cast<std::size_t>(ny_);
+    const double needed = kColumn_bytes * static_cast<double>(n_columns);
+    if (const double limit = memory_limit_bytes(); needed > limit)
+        throw Error(Fault::unsupported, "refused: a mesh over " + std::to_string(nx_) + " x " +
+                                            std::to_string(ny_) + " voxels would need over " +
+                                            human_bytes(needed) + " (limit " + human_bytes(limit) +
+                                            "); use a larger voxel");
     std::vector<std::atomic<std::uint32_t>> count(n_columns);
     constexpr std::size_t kChunk = 256; // faces
     const std::size_t n_faces = mesh.triangles.size();

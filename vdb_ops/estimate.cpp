@@ -36,30 +36,42 @@ double read_bytes(const char* path) {
     return file >> value ? value : HUGE_VAL; // `max` is no number
 }
 
-double kib_of(const char* path, const char* key) {
+/// The number behind a word that begins a line.
+double value_of(const char* path, const std::string& word) {
     std::ifstream file(path);
-    const std::string name = std::string(key) + ":";
     for (std::string line; std::getline(file, line);)
-        if (line.starts_with(name))
-            return std::strtod(line.c_str() + name.size(), nullptr);
+        if (line.starts_with(word))
+            return std::strtod(line.c_str() + word.size(), nullptr);
     return HUGE_VAL;
 }
 
-/// What limits, less what is taken of them already [bytes].
+/// What limits, less what is taken of it already [bytes].
 double left_bytes() {
-    double left = 1024 * kib_of("/proc/meminfo", "MemAvailable");
-    for (const auto& [most, now] :
-         {std::pair("/sys/fs/cgroup/memory.max", "/sys/fs/cgroup/memory.current"),
-          std::pair("/sys/fs/cgroup/memory/memory.limit_in_bytes",
-                    "/sys/fs/cgroup/memory/memory.usage_in_bytes")})
-        if (const double limit = read_bytes(most), used = read_bytes(now);
-            std::isfinite(limit) && std::isfinite(used))
-            left = std::min(left, limit - used);
-    rlimit space{};
-    if (getrlimit(RLIMIT_AS, &space) == 0 && space.rlim_cur != RLIM_INFINITY)
-        left = std::min(left, static_cast<double>(space.rlim_cur) -
-                                  1024 * kib_of("/proc/self/status", "VmSize"));
+    double left = 1024 * value_of("/proc/meminfo", "MemAvailable:");
+    struct Group {
+        const char *most, *now, *stat, *cache; ///< the cache gives way, and is no use that counts
+    };
+    for (const Group& g : {Group{"/sys/fs/cgroup/memory.max", "/sys/fs/cgroup/memory.current",
+                                 "/sys/fs/cgroup/memory.stat", "inactive_file "},
+                           Group{"/sys/fs/cgroup/memory/memory.limit_in_bytes",
+                                 "/sys/fs/cgroup/memory/memory.usage_in_bytes",
+                                 "/sys/fs/cgroup/memory/memory.stat", "total_inactive_file "}})
+        if (const double limit = read_bytes(g.most), used = read_bytes(g.now);
+            std::isfinite(limit) && std::isfinite(used)) {
+            const double cache = value_of(g.stat, g.cache);
+            left = std::min(left, limit - used + (std::isfinite(cache) ? cache : 0));
+        }
     return std::isfinite(left) ? std::max(left, 0.0) : 64e9;
+}
+
+/// What a limit of this process leaves of a resource [bytes].
+double left_of(int resource, const char* now) {
+    rlimit most{};
+    if (::getrlimit(static_cast<__rlimit_resource>(resource), &most) != 0 ||
+        most.rlim_cur == RLIM_INFINITY)
+        return HUGE_VAL;
+    return std::max(0.0,
+                    static_cast<double>(most.rlim_cur) - 1024 * value_of("/proc/self/status", now));
 }
 
 /// The blocks that the surface comes near, of some that are spread evenly over the box.
@@ -142,7 +154,9 @@ double MemoryUse::bytes() const {
 }
 
 double memory_limit_bytes(std::optional<double> asked) {
-    return std::min(kUsable * left_bytes(), asked.value_or(HUGE_VAL));
+    const double left = kUsable * std::min(left_bytes(), left_of(RLIMIT_AS, "VmSize:"));
+    // The second is set by the program itself, to what was asked for and a little more.
+    return std::min(left, asked ? *asked : left_of(RLIMIT_DATA, "VmData:"));
 }
 
 bool may_exceed(const Box& box, double voxel_m, const MemoryUse& use, double limit_bytes) {
@@ -156,6 +170,10 @@ void refuse_if_over(const MemoryUse& use, double voxel_m, double limit_bytes) {
     const double needed = use.bytes();
     if (needed <= limit_bytes)
         return;
+    if (limit_bytes < kProgram_bytes)
+        throw Error(Fault::unsupported, "refused: the program alone needs about " +
+                                            human_bytes(kProgram_bytes) + " (limit " +
+                                            human_bytes(limit_bytes) + "); allow more memory");
     // Leaves go with the area in voxels; what is below a voxel goes faster.
     const double fixed = std::min(kProgram_bytes, 0.5 * limit_bytes);
     const double fits = 1.02 * voxel_m * std::sqrt((needed - fixed) / (limit_bytes - fixed));

@@ -62,6 +62,8 @@ public:
     bool meets(const Sphere& ball) const override {
         const Vec3 c = (ball.center - lattice_.origin) / lattice_.voxel_m;
         const double r = ball.radius_m / lattice_.voxel_m;
+        if (!box_.contains(ball.center)) // nor is a place far off one that the grid can be asked at
+            return any_solid_leaf(c, r);
         const float d =
             openvdb::tools::BoxSampler::sample(accessor_, openvdb::Vec3d(c.x, c.y, c.z));
         if (d < 0.999f * lattice_.half_width_vox * static_cast<float>(lattice_.voxel_m))
@@ -81,7 +83,7 @@ private:
         for (int axis = 0; axis < 3; ++axis) {
             const double first = (box_.lo[axis] - lattice_.origin[axis]) / lattice_.voxel_m;
             const double last = (box_.hi[axis] - lattice_.origin[axis]) / lattice_.voxel_m;
-            if (c[axis] + r < first || c[axis] - r > last)
+            if (!(c[axis] + r >= first && c[axis] - r <= last)) // not a number: not near
                 return false;
             lo[axis] = static_cast<int>(std::floor(std::max(c[axis] - r, first))) & ~7;
             hi[axis] = static_cast<int>(std::ceil(std::min(c[axis] + r, last)));

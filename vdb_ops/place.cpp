@@ -9,6 +9,7 @@
 
 #include "stats/core/error.h"
 #include "stats/number_detail.h"
+#include "vdb_ops/estimate.h"
 #include "vdb_ops/hole_source_detail.h"
 
 namespace taihu {
@@ -17,6 +18,7 @@ namespace {
 constexpr double kTolerance = 0.005; // of the porosity, absolute
 constexpr double kTail = 1e-7;       // share of diameters that the margin round a solid leaves out
 constexpr double kMaxSamples = 4e6;  // points at which porosity is counted
+constexpr double kHole_bytes = 100;  // at the peak: a list grows by doubling
 constexpr std::uint64_t kMaxStreams = 64; // tried for one porosity
 constexpr std::uint32_t kAnotherStream = 0x73747265;
 constexpr int kMaxJoints = 1000;
@@ -98,8 +100,22 @@ Box stationary_box(const Law& law, const Placement& placement, const HoleRegion&
                            "fewer than 1 in 1e5 centres through; widen one of them");
 }
 
+/// Before any is placed. \throws Error bad_argument, unsupported.
+void refuse_too_many(double n, const std::string& what) {
+    if (n > static_cast<double>(kMaxHoles))
+        refuse(what + " asks for " + shortest(std::round(n)) +
+               " holes, at most 1e8 are placed; use a larger scale or a smaller solid");
+    if (const double limit = memory_limit_bytes(); n * kHole_bytes > limit)
+        throw Error(Fault::unsupported,
+                    "refused: " + what + " asks for " + shortest(std::round(n)) +
+                        " holes, which would need about " + human_bytes(n * kHole_bytes) +
+                        " (limit " + human_bytes(limit) +
+                        "); use a larger scale or a smaller solid");
+}
+
 PlacedHoles place_count(const Law& law, const Placement& p, const HoleRegion& region,
                         Progress* progress) {
+    refuse_too_many(static_cast<double>(*p.count), "the count");
     HoleSource source(law, p, region, region.box(), p.seed);
     const Thinning thinning(p, region);
     const auto wanted = static_cast<double>(*p.count);
@@ -131,9 +147,7 @@ PlacedHoles place_density(const Law& law, const Placement& p, const HoleRegion& 
     const bool joints = is<JointsPattern>(p.pattern);
     const double mean =
         joints ? *p.density_m3 * region.volume_m3() : source.mean_count(*p.density_m3);
-    if (mean > static_cast<double>(kMaxHoles))
-        refuse("the density asks for " + std::to_string(mean) +
-               " holes, at most 1e8 are placed; use a larger scale or a smaller solid");
+    refuse_too_many(mean, "the density");
     const std::uint64_t n = poisson_count(mean, {p.seed, kCountStream});
     source.lay_out(static_cast<double>(n), progress);
     PlacedHoles placed;
@@ -173,7 +187,10 @@ class PorositySamples {
 public:
     explicit PorositySamples(const HoleRegion& region) : box_(region.box()) {
         const Vec3 size = box_.size();
-        step_ = std::cbrt(size.x * size.y * size.z / kMaxSamples);
+        step_ = std::max(std::cbrt(size.x * size.y * size.z / kMaxSamples), 1e-7 * box_.longest());
+        const auto n = [&](double side) { return std::floor(side / step_) + 1; };
+        while (!(n(size.x) * n(size.y) * n(size.z) <= 8 * kMaxSamples)) // a flat or a thin one
+            step_ *= 1.25;
         for (int axis = 0; axis < 3; ++axis)
             n_[axis] = static_cast<int>(size[axis] / step_) + 1;
         there_.resize(static_cast<std::size_t>(n_[0]) * static_cast<std::size_t>(n_[1]) *
@@ -313,16 +330,18 @@ double balls_for(double porosity, const Box& box, const Law& law, double scale_m
 PlacedHoles place_porosity(const Law& law, const Placement& p, const HoleRegion& region,
                            Progress* progress) {
     const double target = *p.porosity;
+    const Box box = stationary_box(law, p, region);
+    const double least = balls_for(target, box, law, p.scale_m); // more, as they overlap
+    refuse_too_many(least, "the porosity");
     const PorositySamples samples(region);
     const Thinning thinning(p, region);
-    const Box box = stationary_box(law, p, region);
     // One large hole may step over the target: then another stream of the same seed is tried.
     Prefix prefix;
     for (std::uint64_t stream = 0; stream < kMaxStreams; ++stream) {
         const auto w = Rng{p.seed, kAnotherStream}.words(stream);
         const std::uint64_t seed = stream == 0 ? p.seed : std::uint64_t{w[0]} << 32 | w[1];
         HoleSource source(law, p, region, box, seed);
-        source.lay_out(balls_for(target, box, law, p.scale_m), progress);
+        source.lay_out(least, progress);
         while (!(prefix = place_prefix(source, p, region, thinning, samples, progress)).enough)
             source.lay_out_more(prefix.porosity, target, progress);
         if (std::fabs(prefix.porosity - target) <= kTolerance)

@@ -74,12 +74,12 @@ Json pattern_json(const Pattern& pattern) {
 /// A recipe's text as JSON; null when it is not one. It may come from any file: depth and size are
 /// limited.
 Json recipe_json(const std::string& recipe) {
+    Json json;
     try {
-        parse_json(recipe, "recipe");
+        json = parse_ordered_json(recipe, "recipe");
     } catch (const Error&) {
         return nullptr;
     }
-    Json json = Json::parse(recipe); // again, because this one keeps the order of keys
     if (!json.is_object() || !json.contains("taihu_recipe") || !json.contains("solid") ||
         !json["solid"].is_object())
         return nullptr;

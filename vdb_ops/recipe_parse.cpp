@@ -17,6 +17,7 @@
 #include "stats/io/holes_file.h"
 #include "stats/io/json_detail.h"
 #include "stats/io/law_file.h"
+#include "vdb_ops/estimate.h"
 #include "vdb_ops/recipe_keys_detail.h"
 #include "vdb_ops/vdb_file.h"
 
@@ -29,6 +30,7 @@ using Node = std::unique_ptr<RecipeNode>;
 constexpr std::uint32_t kSeedStream = 0x72637065;
 constexpr double kMost_m = kMostLength_m;
 constexpr double kMostSeed = 1.8446744073709551e19;
+constexpr double kTriangle_bytes = 300; // of a closed mesh and its field at the peak, as measured
 
 [[noreturn]] void refuse_unknown(const std::string& where, const char* what,
                                  const std::string& name, std::span<const std::string_view> known) {
@@ -52,6 +54,16 @@ FractalSettings fractal_of(const Keys& keys) {
     f.corners = keys.number_or("corners", f.corners, 0, 1);
     f.roundness = keys.number_or("roundness", f.roundness, 0, 1);
     return f;
+}
+
+/// Of the mesh that a shape's field is made of; 0 where it is a formula.
+double n_triangles(const ShapeSettings& s) {
+    if (s.kind == ShapeKind::icosphere || s.kind == ShapeKind::boulder)
+        return 20 * std::exp2(2 * s.subdivisions);
+    if (s.kind == ShapeKind::fractal_rock)
+        return 20 * std::exp2(2 * s.fractal.base +
+                              (s.fractal.damping == Damping::none ? 2 : 4) * s.fractal.iterations);
+    return 0;
 }
 
 Node parse_shape(ShapeKind kind, const json& body, const std::string& where, RecipeParser& parser) {
@@ -94,6 +106,7 @@ Node parse_shape(ShapeKind kind, const json& body, const std::string& where, Rec
         s.fractal = fractal_of(keys);
     if (seeded)
         s.seed = seed_of(keys, parser);
+    parser.charge(kTriangle_bytes * n_triangles(s), where);
     return make_shape_node(s);
 }
 
@@ -126,13 +139,16 @@ Node parse_mesh(const json& body, const std::string& where, RecipeParser& parser
                       "all at once; drop one of them");
     if (!parser.assets.read_mesh)
         refuse(where, "nothing here reads mesh files; voxelize it first");
-    return make_mesh_node(parser.assets.read_mesh(path, unit_m, z_up), where,
-                          close_settings(rule, shells));
+    TriMesh mesh = parser.assets.read_mesh(path, unit_m, z_up);
+    parser.charge(kTriangle_bytes * static_cast<double>(mesh.triangles.size()), where);
+    return make_mesh_node(std::move(mesh), where, close_settings(rule, shells));
 }
 
 Node parse_level_set(const json& body, const std::string& where, RecipeParser& parser) {
     const Keys keys(body, where, {"file", "sha256"});
-    return make_level_set_node(read_vdb(file_of(keys, "file", parser)).solid);
+    const auto solid = read_vdb(file_of(keys, "file", parser)).solid;
+    parser.charge(static_cast<double>(solid->memUsage()), where);
+    return make_level_set_node(solid);
 }
 
 Node parse_combined(Combine how, const json& body, const std::string& where, RecipeParser& parser) {
@@ -368,6 +384,15 @@ std::filesystem::path file_of(const Keys& keys, const char* key, const RecipePar
 
 std::uint64_t seed_of(const Keys& keys, RecipeParser& parser) {
     return keys.has("seed") ? keys.whole("seed", kMostSeed) : parser.next_seed();
+}
+
+void RecipeParser::charge(double bytes, const std::string& where) {
+    n_bytes += bytes;
+    if (n_bytes > most_bytes)
+        throw Error(Fault::unsupported,
+                    where + ": refused: the parts up to here would need about " +
+                        human_bytes(n_bytes) + " (limit " + human_bytes(most_bytes) +
+                        "); use fewer subdivisions, iterations or parts");
 }
 
 std::uint64_t RecipeParser::next_seed() {

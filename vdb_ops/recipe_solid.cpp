@@ -5,6 +5,7 @@
 #include <nlohmann/json.hpp>
 
 #include "stats/core/error.h"
+#include "stats/core/of_file.h"
 #include "stats/core/text.h"
 #include "stats/io/json_detail.h"
 #include "stats/io/utf_detail.h"
@@ -187,9 +188,9 @@ double voxel_of(const json& recipe, const std::string& where, const RecipeSettin
 }
 
 /// What makes the solid again: the recipe with the settings in it, keys as they stood.
-std::string settled(const std::string& text, const RecipeReport& made, std::uint64_t seed,
-                    double scale) {
-    const ordered_json given = ordered_json::parse(text);
+std::string settled(const std::string& text, const std::string& where, const RecipeReport& made,
+                    std::uint64_t seed, double scale) {
+    const ordered_json given = parse_ordered_json(text, where, kMostBytes);
     ordered_json solid = given["solid"];
     if (scale != 1) {
         ordered_json node = {{"transform", {{"of", std::move(solid)}, {"scale", scale}}}};
@@ -209,6 +210,12 @@ std::string settled(const std::string& text, const RecipeReport& made, std::uint
     return out.dump();
 }
 
+void check_settings(const RecipeSettings& settings) {
+    if (settings.height_m && !(*settings.height_m > 0 && std::isfinite(*settings.height_m)))
+        throw Error(Fault::bad_argument,
+                    "height: " + shortest(*settings.height_m) + " m; must be > 0");
+}
+
 /// A recipe read and placed; what it says of itself goes into `made`.
 struct ReadyRecipe {
     std::unique_ptr<RecipeNode> root;
@@ -219,11 +226,9 @@ struct ReadyRecipe {
     ReadyRecipe(const std::string& recipe, const std::string& where, const RecipeAssets& assets,
                 const RecipeSettings& settings, RecipeReport& made, Progress* progress) {
         const json text = read_recipe(recipe, where);
-        if (settings.height_m && !(*settings.height_m > 0 && std::isfinite(*settings.height_m)))
-            throw Error(Fault::bad_argument,
-                        "height: " + shortest(*settings.height_m) + " m; must be > 0");
         const std::uint64_t seed = seed_of(text, where, settings);
-        RecipeParser parser{assets, seed, nullptr, 0};
+        RecipeParser parser{assets, seed};
+        parser.most_bytes = memory_limit_bytes(settings.memory_bytes);
         if (text.contains("material"))
             parser.material = &text["material"];
         report_stage(progress, "reading the recipe");
@@ -240,7 +245,7 @@ struct ReadyRecipe {
             if (std::fabs(given.voxel_m - made.voxel_m) <= 1e-9 * made.voxel_m)
                 lattice = given;
         }
-        made.recipe = settled(recipe, made, seed, scale);
+        made.recipe = settled(recipe, where, made, seed, scale);
     }
 };
 
@@ -271,26 +276,32 @@ RecipeEstimate memory_of(const ReadyRecipe& ready, const RecipeSettings& setting
 RecipeEstimate estimate_recipe(const std::string& recipe, const std::string& where,
                                const RecipeAssets& assets, const RecipeSettings& settings,
                                Progress* progress) {
-    RecipeReport made;
-    const ReadyRecipe ready(recipe, where, assets, settings, made, progress);
-    refuse_if_too_large(0, ready.box, made.voxel_m);
-    return memory_of(ready, settings, progress);
+    check_settings(settings);
+    return of_file(where, [&] {
+        RecipeReport made;
+        const ReadyRecipe ready(recipe, where, assets, settings, made, progress);
+        refuse_if_too_large(0, ready.box, made.voxel_m);
+        return memory_of(ready, settings, progress);
+    });
 }
 
 RecipeSolid make_recipe(const std::string& recipe, const std::string& where,
                         const RecipeAssets& assets, const RecipeSettings& settings,
                         Progress* progress) {
+    check_settings(settings);
     RecipeSolid made;
-    const ReadyRecipe ready(recipe, where, assets, settings, made, progress);
-    refuse_if_too_large(0, ready.box, made.voxel_m);
-    MemoryUse least{.leaves = 0, .cleaned = true, .meshed = settings.meshed};
-    const double limit = memory_limit_bytes(settings.memory_bytes);
-    if (may_exceed(ready.box, made.voxel_m, least, limit))
-        refuse_if_over(memory_of(ready, settings, progress).memory, made.voxel_m, limit);
-    NodeSolid solid =
-        ready.root->solid({ready.lattice, made.found, made.holes, progress}, ready.at);
-    made.solid = std::move(solid.grid);
-    made.field = std::move(solid.field);
+    of_file(where, [&] {
+        const ReadyRecipe ready(recipe, where, assets, settings, made, progress);
+        refuse_if_too_large(0, ready.box, made.voxel_m);
+        MemoryUse least{.leaves = 0, .cleaned = true, .meshed = settings.meshed};
+        const double limit = memory_limit_bytes(settings.memory_bytes);
+        if (may_exceed(ready.box, made.voxel_m, least, limit))
+            refuse_if_over(memory_of(ready, settings, progress).memory, made.voxel_m, limit);
+        NodeSolid solid =
+            ready.root->solid({ready.lattice, made.found, made.holes, progress}, ready.at);
+        made.solid = std::move(solid.grid);
+        made.field = std::move(solid.field);
+    });
     return made;
 }
 
@@ -298,27 +309,30 @@ RecipeTiles make_recipe_tiles(const std::string& recipe, const std::string& wher
                               const RecipeAssets& assets, const RecipeSettings& settings,
                               const std::filesystem::path& folder, int tile_voxels,
                               Progress* progress) {
+    check_settings(settings);
     RecipeTiles made;
-    const ReadyRecipe ready(recipe, where, assets, settings, made, progress);
-    refuse_if_too_large(0, ready.box, made.voxel_m); // tiles are of any size
-    const RecipeScene scene{ready.lattice, made.found, made.holes, progress};
-    const auto cleaning = ready.root->cleaning();
-    TileSettings tiles{tile_voxels, {}};
-    if (cleaning)
-        tiles.clean = cleaning->settings;
-    const auto field = cleaning ? cleaning->of->tile_field(scene, ready.at * cleaning->by)
-                                : ready.root->tile_field(scene, ready.at);
-    made.tiles = write_tiles(folder, *field, ready.lattice, tiles, made.recipe, progress);
-    if (made.tiles.cleaned)
-        for (const std::string& line : cleaning_lines(*made.tiles.cleaned))
-            made.found.push_back(where + ": " + line);
+    of_file(where, [&] {
+        const ReadyRecipe ready(recipe, where, assets, settings, made, progress);
+        refuse_if_too_large(0, ready.box, made.voxel_m); // tiles are of any size
+        const RecipeScene scene{ready.lattice, made.found, made.holes, progress};
+        const auto cleaning = ready.root->cleaning();
+        TileSettings tiles{tile_voxels, {}};
+        if (cleaning)
+            tiles.clean = cleaning->settings;
+        const auto field = cleaning ? cleaning->of->tile_field(scene, ready.at * cleaning->by)
+                                    : ready.root->tile_field(scene, ready.at);
+        made.tiles = write_tiles(folder, *field, ready.lattice, tiles, made.recipe, progress);
+        if (made.tiles.cleaned)
+            for (const std::string& line : cleaning_lines(*made.tiles.cleaned))
+                made.found.push_back(where + ": " + line);
+    });
     return made;
 }
 
 std::string with_setting(const std::string& recipe, const std::string& where,
                          const std::string& key, const std::string& value) {
     read_recipe(recipe, where);
-    ordered_json text = ordered_json::parse(recipe);
+    ordered_json text = parse_ordered_json(recipe, where, kMostBytes);
     std::string path = key;
     if (!key.starts_with('/')) {
         const ordered_json names = text.value("set", ordered_json::object());

@@ -1,6 +1,7 @@
 #include "vdb_ops/tiles.h"
 
 #include <cmath>
+#include <set>
 #include <system_error>
 
 #include <nlohmann/json.hpp>
@@ -276,16 +277,22 @@ TileSet read_tile_set(const fs::path& path) {
         set.lattice.origin[static_cast<int>(axis)] = origin[axis].get<double>();
     }
     if (!text["recipe"].is_null())
-        set.recipe = ordered_json::parse(bytes)["recipe"].dump();
+        set.recipe = parse_ordered_json(bytes, where, kMostBytes)["recipe"].dump();
     if (!text["tiles"].is_array())
         throw Error(Fault::bad_input, where + ": 'tiles' must be a list; correct it");
-    for (std::size_t i = 0; i < text["tiles"].size(); ++i)
-        set.tiles.push_back(
-            tile_of(text["tiles"][i], where + ": tiles[" + std::to_string(i) + "]"));
+    std::set<std::string> names;
+    for (std::size_t i = 0; i < text["tiles"].size(); ++i) {
+        const std::string place = where + ": tiles[" + std::to_string(i) + "]";
+        set.tiles.push_back(tile_of(text["tiles"][i], place));
+        if (!names.insert(set.tiles.back().file).second)
+            throw Error(Fault::bad_input,
+                        place + ": '" + set.tiles.back().file + "' is there twice; drop one");
+    }
     return set;
 }
 
-openvdb::FloatGrid::Ptr read_tile(const fs::path& folder, const Tile& tile) {
+openvdb::FloatGrid::Ptr read_tile(const fs::path& folder, const Tile& tile,
+                                  const Lattice& lattice) {
     const auto path = file_in(folder, tile.file);
     if (!path)
         throw Error(Fault::io, (folder / tile.file).string() +
@@ -293,7 +300,15 @@ openvdb::FloatGrid::Ptr read_tile(const fs::path& folder, const Tile& tile) {
     if (sha256_hex(read_file(*path)) != tile.sha256)
         throw Error(Fault::bad_input, path->string() + ": another file than the one that " +
                                           kTileSetName + " means; write the tiles again");
-    return read_vdb(*path).solid;
+    const auto grid = read_vdb(*path).solid;
+    const Lattice own = lattice_of(*grid);
+    constexpr double kSame = 1e-9; // of a voxel
+    if (std::abs(own.half_width_vox - lattice.half_width_vox) > 1e-5f * lattice.half_width_vox ||
+        std::abs(own.voxel_m - lattice.voxel_m) > kSame * lattice.voxel_m ||
+        length(own.origin - lattice.origin) > kSame * lattice.voxel_m)
+        throw Error(Fault::bad_input,
+                    tile.file + ": has another lattice than the set; write the tiles again");
+    return grid;
 }
 
 VdbFile read_solid_vdb(const fs::path& path, Progress* progress) {
@@ -321,10 +336,7 @@ openvdb::FloatGrid::Ptr read_tiles(const fs::path& set_path, Progress* progress)
     auto& root = whole->tree().root();
     for (const Tile& t : set.tiles) {
         check_cancelled(progress);
-        const auto grid = read_tile(set_path.parent_path(), t);
-        if (lattice_of(*grid).half_width_vox != lattice_of(*whole).half_width_vox)
-            throw Error(Fault::bad_input,
-                        t.file + ": has another half band than the set; write the tiles again");
+        const auto grid = read_tile(set_path.parent_path(), t, set.lattice);
         // Tiles are whole nodes of 128^3, so nodes change hands and nothing is merged.
         std::vector<Coord> origins;
         for (auto top = grid->tree().root().beginChildOn(); top; ++top)

@@ -61,8 +61,10 @@ TilesResult write_tiles(const std::filesystem::path& folder, const Field& field,
 /// Reads a tiles.json. \throws Error bad_input, with the key; io.
 TileSet read_tile_set(const std::filesystem::path& path);
 
-/// One tile of a set. \throws Error bad_input: another file than the set means; as read_vdb().
-openvdb::FloatGrid::Ptr read_tile(const std::filesystem::path& folder, const Tile& tile);
+/// One tile of a set on this lattice. \throws Error bad_input: another file than the set means, or
+/// another lattice; as read_vdb().
+openvdb::FloatGrid::Ptr read_tile(const std::filesystem::path& folder, const Tile& tile,
+                                  const Lattice& lattice);
 
 /// A tile as a solid of its own, for what needs a closed one: cut off half a voxel within its box.
 openvdb::FloatGrid::Ptr tile_solid(const openvdb::FloatGrid& tile, const openvdb::CoordBBox& box,

@@ -8,6 +8,7 @@
 #include "stats/core/error.h"
 #include "stats/core/file.h"
 #include "stats/core/foreign.h"
+#include "stats/core/of_file.h"
 #include "stats/core/sha256.h"
 #include "stats/core/text.h"
 #include "vdb_ops/flat_grid_detail.h"
@@ -104,11 +105,13 @@ VdbFile read_vdb(const std::filesystem::path& path, Progress* progress) {
         throw Error(Fault::bad_input,
                     where +
                         ": holds no float level set; convert a fog volume to a level set first");
-    try {
-        lattice_of(*result.solid);
-    } catch (const Error& e) {
-        throw Error(Fault::bad_input, where + ": " + e.what());
-    }
+    of_file(where, [&] { lattice_of(*result.solid); });
+    openvdb::CoordBBox box;
+    const openvdb::Coord most(1 << 30); // places are counted in int
+    if (result.solid->tree().evalLeafBoundingBox(box) &&
+        !openvdb::CoordBBox(-most, most).isInside(box))
+        throw Error(Fault::bad_input, where + ": reaches beyond voxel 2^30; move the solid nearer "
+                                              "to the origin");
     if (const auto recipe = result.solid->getMetadata<openvdb::StringMetadata>(kRecipeKey))
         result.recipe = recipe->value();
     if (const auto tile = result.solid->getMetadata<openvdb::StringMetadata>(kTileKey))

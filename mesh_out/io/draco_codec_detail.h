@@ -1,6 +1,7 @@
 #pragma once
 #include <cstdint>
 #include <optional>
+#include <span>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -41,10 +42,16 @@ struct DracoMesh {
 /// decode_draco() and the ids.
 DracoMesh decode_draco_mesh(std::string_view bytes, const std::string& where);
 
-/// The same, in a program of its own unless the stream is our own. \throws Error also as
-/// read_foreign().
-DracoMesh read_draco(std::string_view bytes, const std::string& where, bool is_own,
-                     Progress* progress);
+/// Some bytes of a file, and where they are in messages: `rock.glb:byte 1234`.
+struct DracoStream {
+    std::string_view bytes;
+    std::string where;
+};
+
+/// decode_draco_mesh() of each: of all in one program of its own, unless they are our own.
+/// \param where  the file. \throws Error also as read_foreign().
+std::vector<DracoMesh> read_draco(std::span<const DracoStream> streams, const std::string& where,
+                                  bool is_own, Progress* progress);
 
 /// What encode_draco() made of a textured mesh.
 TexturedMesh decode_textured_draco(std::string_view bytes, const std::string& where);

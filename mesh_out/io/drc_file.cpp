@@ -9,7 +9,9 @@ namespace taihu {
 
 MeshFile parse_drc(std::string_view bytes, const std::string& where, bool is_own,
                    Progress* progress) {
-    DracoMesh decoded = read_draco(bytes, where + ":byte 0", is_own, progress);
+    const DracoStream whole{bytes, where + ":byte 0"};
+    DracoMesh decoded =
+        std::move(read_draco(std::span(&whole, 1), where, is_own, progress).front());
     MeshFile file;
     file.draco = true;
     file.recipe = std::move(decoded.recipe);

@@ -7,10 +7,9 @@
 
 namespace taihu {
 
-std::string flat_draco(std::string_view bytes, const std::string& where,
-                       const std::vector<std::string>& /*words*/) {
-    const DracoMesh decoded = decode_draco_mesh(bytes, where);
-    FlatWriter out;
+namespace {
+
+void put_mesh(FlatWriter& out, const DracoMesh& decoded) {
     out.put_all(std::span(decoded.mesh.positions));
     out.put_all(std::span(decoded.mesh.triangles));
     out.put_all(std::span(decoded.mesh.normals));
@@ -22,15 +21,9 @@ std::string flat_draco(std::string_view bytes, const std::string& where,
     }
     out.put_text(decoded.recipe);
     out.put_all(std::span(decoded.ids));
-    return std::move(out.bytes);
 }
 
-DracoMesh read_draco(std::string_view bytes, const std::string& where, bool is_own,
-                     Progress* progress) {
-    if (is_own)
-        return decode_draco_mesh(bytes, where);
-    const std::string flat = read_foreign("draco", bytes, where, {}, progress);
-    FlatReader in(flat, where);
+DracoMesh get_mesh(FlatReader& in) {
     DracoMesh out;
     TriMesh& mesh = out.mesh;
     mesh.positions = in.get_all<std::vector<Vec3>>();
@@ -46,7 +39,6 @@ DracoMesh read_draco(std::string_view bytes, const std::string& where, bool is_o
     }
     out.recipe = in.get_text();
     out.ids = in.get_all<std::vector<std::uint32_t>>();
-    in.expect_end();
     const std::size_t n = mesh.positions.size();
     const auto fits = [n](std::size_t size) { return size == 0 || size == n; };
     if (!fits(mesh.normals.size()) || !fits(mesh.openness.size()) ||
@@ -58,6 +50,42 @@ DracoMesh read_draco(std::string_view bytes, const std::string& where, bool is_o
                      [n](const Triangle& t) { return t[0] < n && t[1] < n && t[2] < n; }))
         in.fail("is no mesh");
     return out;
+}
+
+} // namespace
+
+std::string flat_draco(std::string_view bytes, const std::string& where,
+                       const std::vector<std::string>& /*words*/) {
+    FlatReader in(bytes, where);
+    FlatWriter out;
+    for (auto left = in.get<std::uint64_t>(); left > 0; --left) {
+        const std::string place = in.get_text();
+        put_mesh(out, decode_draco_mesh(in.get_text(), place));
+    }
+    return std::move(out.bytes);
+}
+
+std::vector<DracoMesh> read_draco(std::span<const DracoStream> streams, const std::string& where,
+                                  bool is_own, Progress* progress) {
+    std::vector<DracoMesh> meshes;
+    if (is_own) {
+        for (const DracoStream& s : streams)
+            meshes.push_back(decode_draco_mesh(s.bytes, s.where));
+        return meshes;
+    }
+    FlatWriter all;
+    all.put<std::uint64_t>(streams.size());
+    for (const DracoStream& s : streams) {
+        all.put_text(s.where);
+        all.put_text(s.bytes);
+    }
+    const std::string& place = streams.size() == 1 ? streams.front().where : where;
+    const std::string flat = read_foreign("draco", all.bytes, place, {}, progress);
+    FlatReader in(flat, place);
+    for (std::size_t i = 0; i < streams.size(); ++i)
+        meshes.push_back(get_mesh(in));
+    in.expect_end();
+    return meshes;
 }
 
 } // namespace taihu

@@ -150,7 +150,7 @@ void GlbDocument::parse_json(std::string_view text) {
         fail("the JSON is not an object", "export it again");
 }
 
-const GlbDocument::Json* GlbDocument::find(const Json& object, const char* key) const {
+const GlbDocument::Json* GlbDocument::find(const Json& object, const std::string& key) const {
     if (!object.is_object())
         return nullptr;
     const auto found = object.find(key);
@@ -171,27 +171,27 @@ const GlbDocument::Json& GlbDocument::item(const char* list, std::uint64_t index
     return found;
 }
 
-std::optional<std::uint64_t> GlbDocument::whole(const Json& object, const char* key,
+std::optional<std::uint64_t> GlbDocument::whole(const Json& object, const std::string& key,
                                                 const std::string& path) const {
     const Json* value = find(object, key);
     if (!value)
         return std::nullopt;
     if (!value->is_number_unsigned() || value->get<std::uint64_t>() > kMaxWhole)
-        fail(path + '.' + key + " is " + printable(value->dump(-1, ' ', true)) +
+        fail(path + '.' + printable(key) + " is " + printable(value->dump(-1, ' ', true)) +
                  ", must be a whole number from 0 to 2^32",
              "export it again");
     return value->get<std::uint64_t>();
 }
 
-std::uint64_t GlbDocument::needed_whole(const Json& object, const char* key,
+std::uint64_t GlbDocument::needed_whole(const Json& object, const std::string& key,
                                         const std::string& path) const {
     const auto value = whole(object, key, path);
     if (!value)
-        fail(path + " has no " + key, "export it again");
+        fail(path + " has no " + printable(key), "export it again");
     return *value;
 }
 
-std::optional<std::vector<double>> GlbDocument::numbers(const Json& object, const char* key,
+std::optional<std::vector<double>> GlbDocument::numbers(const Json& object, const std::string& key,
                                                         std::size_t n,
                                                         const std::string& path) const {
     const Json* values = find(object, key);

@@ -58,16 +58,17 @@ public:
     [[noreturn]] void refuse(const std::string& what, const std::string& remedy) const;
 
     /// `object[key]`, or null when there is none.
-    const Json* find(const Json& object, const char* key) const;
+    const Json* find(const Json& object, const std::string& key) const;
     /// root[list][index], an object.
     const Json& item(const char* list, std::uint64_t index) const;
     /// A whole number >= 0; `path` names the object in messages.
-    std::optional<std::uint64_t> whole(const Json& object, const char* key,
+    std::optional<std::uint64_t> whole(const Json& object, const std::string& key,
                                        const std::string& path) const;
-    std::uint64_t needed_whole(const Json& object, const char* key, const std::string& path) const;
+    std::uint64_t needed_whole(const Json& object, const std::string& key,
+                               const std::string& path) const;
     /// `n` finite numbers.
-    std::optional<std::vector<double>> numbers(const Json& object, const char* key, std::size_t n,
-                                               const std::string& path) const;
+    std::optional<std::vector<double>> numbers(const Json& object, const std::string& key,
+                                               std::size_t n, const std::string& path) const;
 
     /// The bytes of a buffer view, and where in the file they begin.
     std::string_view view(std::uint64_t index) const;

@@ -1,6 +1,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <map>
 
 #include "mesh_out/io/draco_codec_detail.h"
 #include "mesh_out/io/glb_document_detail.h"
@@ -18,6 +19,8 @@ constexpr int kMaxNodeDepth = 64;
 constexpr std::size_t kMaxLevels = 16;
 /// Small files may place a mesh many times, but not without end.
 constexpr std::size_t kFreeItems = std::size_t{1} << 24;
+constexpr std::uint64_t kPrimitiveItems = 16; ///< what one costs that has no vertex
+constexpr const char* kDraco = "KHR_draco_mesh_compression";
 /// Encoders that state the bounds of their input are off by half a step of their quantisation;
 /// 1/256 of the largest side is that of 7 bits, coarser than any in use.
 constexpr double kBoundsTolerance = 1.0 / 256;
@@ -71,6 +74,7 @@ private:
                         TriMesh& level);
     void read_draco(const Json& primitive, const Json& extension, const std::string& path,
                     const Placement& placement, TriMesh& level);
+    void decode_streams();
     void check_draco(const DracoMesh& decoded, const Json& primitive, const Json& extension,
                      const std::string& path) const;
     void check_bounds(const TriMesh& mesh, const GltfAccessor& position) const;
@@ -90,14 +94,15 @@ private:
     MeshFile file_;
     std::vector<char> visited_;
     std::uint64_t n_items_ = 0;
+    std::map<std::uint64_t, DracoMesh> draco_; ///< by their buffer views
 };
 
 void GlbReader::check_extensions() const {
     const Json* required = document_.find(document_.root(), "extensionsRequired");
     if (!required)
         return;
-    static constexpr std::array<std::string_view, 3> kKnown = {"KHR_draco_mesh_compression",
-                                                               "KHR_mesh_quantization", "MSFT_lod"};
+    static constexpr std::array<std::string_view, 3> kKnown = {kDraco, "KHR_mesh_quantization",
+                                                               "MSFT_lod"};
     static constexpr std::array<std::string_view, 3> kLooksOnly = {"KHR_materials_", "KHR_texture_",
                                                                    "EXT_texture_"};
     if (!required->is_array())
@@ -301,13 +306,14 @@ void GlbReader::add_triangle_at(const Triangle& corners, std::size_t first, bool
 
 void GlbReader::read_primitive(const Json& primitive, const std::string& path,
                                const Placement& placement, TriMesh& level) {
+    spend(kPrimitiveItems, path);
     const std::uint64_t mode = document_.whole(primitive, "mode", path).value_or(kTriangles);
     if (mode < kTriangles)
         return; // points and lines
     if (mode > kFan)
         document_.fail(path + ".mode is " + std::to_string(mode), "export it again");
     if (const Json* extensions = document_.find(primitive, "extensions"))
-        if (const Json* draco = document_.find(*extensions, "KHR_draco_mesh_compression")) {
+        if (const Json* draco = document_.find(*extensions, kDraco)) {
             if (mode != kTriangles)
                 document_.refuse(path + " is a Draco strip", "export triangles");
             read_draco(primitive, *draco, path, placement, level);
@@ -394,7 +400,7 @@ void GlbReader::check_draco(const DracoMesh& decoded, const Json& primitive, con
         document_.fail(path + " has no attributes", "export it again");
     for (const auto& [name, json] : ids->items()) {
         const std::string label = path + " attribute " + printable(name);
-        const std::uint64_t id = document_.needed_whole(*ids, name.c_str(), path + ".attributes");
+        const std::uint64_t id = document_.needed_whole(*ids, name, path + ".attributes");
         const bool right = name == "POSITION" ? id == decoded.position_id
                            : name == "NORMAL" ? decoded.normal_id && id == *decoded.normal_id
                                               : std::find(decoded.ids.begin(), decoded.ids.end(),
@@ -417,18 +423,49 @@ void GlbReader::check_draco(const DracoMesh& decoded, const Json& primitive, con
     check_count(document_.needed_whole(primitive, "indices", path),
                 3 * decoded.mesh.triangles.size(), "indices");
     for (const auto& [name, json] : ids->items())
-        check_count(document_.needed_whole(*attributes, name.c_str(), path + ".attributes"),
+        check_count(document_.needed_whole(*attributes, name, path + ".attributes"),
                     decoded.mesh.positions.size(), "points");
     check_bounds(decoded.mesh, document_.accessor(document_.needed_whole(*attributes, "POSITION",
                                                                          path + ".attributes")));
 }
 
+/// Those of all meshes at once: a file may have hundreds, and each call starts a program.
+void GlbReader::decode_streams() {
+    std::vector<DracoStream> streams;
+    std::vector<DracoMesh*> into;
+    std::size_t n_bytes = 0;
+    const std::size_t n_meshes = document_.find(document_.root(), "meshes")->size();
+    for (std::size_t m = 0; m < n_meshes; ++m) {
+        const Json* primitives = document_.find(document_.item("meshes", m), "primitives");
+        if (!primitives)
+            continue;
+        for (const Json& primitive : *primitives) {
+            const Json* extensions = document_.find(primitive, "extensions");
+            const Json* draco = extensions ? document_.find(*extensions, kDraco) : nullptr;
+            if (!draco)
+                continue;
+            const auto view = document_.needed_whole(*draco, "bufferView", path_of("meshes", m));
+            const auto [place, is_new] = draco_.try_emplace(view);
+            if (!is_new)
+                continue;
+            const std::string_view bytes = document_.view(view);
+            n_bytes += bytes.size();
+            if (n_bytes > document_.n_bytes())
+                document_.fail("its Draco streams overlap", "export it again");
+            streams.push_back({bytes, where_ + ":byte " + std::to_string(document_.offset(bytes))});
+            into.push_back(&place->second);
+        }
+    }
+    std::vector<DracoMesh> meshes = taihu::read_draco(streams, where_, is_own_, progress_);
+    for (std::size_t i = 0; i < meshes.size(); ++i)
+        *into[i] = std::move(meshes[i]);
+}
+
 void GlbReader::read_draco(const Json& primitive, const Json& extension, const std::string& path,
                            const Placement& placement, TriMesh& level) {
-    const std::string_view stream = document_.view(
-        document_.needed_whole(extension, "bufferView", path + ".KHR_draco_mesh_compression"));
-    const DracoMesh decoded = taihu::read_draco(
-        stream, where_ + ":byte " + std::to_string(document_.offset(stream)), is_own_, progress_);
+    if (draco_.empty())
+        decode_streams();
+    const DracoMesh& decoded = draco_.at(document_.needed_whole(extension, "bufferView", path));
     check_draco(decoded, primitive, extension, path);
     spend(decoded.mesh.positions.size() + decoded.mesh.triangles.size(), path);
     file_.draco = true;

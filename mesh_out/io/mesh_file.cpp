@@ -16,6 +16,7 @@ namespace {
 constexpr std::array<std::string_view, 6> kExtensions = {".obj", ".ply", ".stl",
                                                          ".off", ".glb", ".drc"};
 constexpr std::array<const char*, 6> kNames = {"OBJ", "PLY", "STL", "OFF", "GLB", "DRC"};
+constexpr double kMostPlace_m = 1e12; // what is multiplied and summed of it stays finite
 constexpr std::string_view kRecipeMarker = "taihu_recipe ";
 
 const char* name_of(MeshFormat format) {
@@ -106,9 +107,10 @@ MeshFile parse_mesh(std::string_view bytes, MeshFormat format, const std::string
             p *= settings.unit_m;
             if (settings.up == UpAxis::z)
                 p = {p.x, p.z, -p.y};
-            if (!is_finite(p))
-                throw Error(Fault::bad_input,
-                            where + ":1: a position is too large; check the unit");
+            for (int axis = 0; axis < 3; ++axis)
+                if (!(std::abs(p[axis]) <= kMostPlace_m))
+                    throw Error(Fault::bad_input,
+                                where + ":1: a position is beyond 1e12 m; check the unit");
         }
         if (settings.up == UpAxis::z)
             for (Vec3& n : level.normals)
@@ -147,8 +149,8 @@ void check_writable(const TriMesh& mesh, const std::string& who) {
         fail(std::to_string(mesh.positions.size()) + " positions, at most 2^32 - 1", "simplify it");
     for (std::size_t i = 0; i < mesh.positions.size(); ++i)
         for (int axis = 0; axis < 3; ++axis)
-            if (!(std::abs(mesh.positions[i][axis]) <= std::numeric_limits<float>::max()))
-                fail("positions[" + std::to_string(i) + "] does not fit a float", "scale it down");
+            if (!(std::abs(mesh.positions[i][axis]) <= kMostPlace_m))
+                fail("positions[" + std::to_string(i) + "] is beyond 1e12 m", "scale it down");
     for (std::size_t i = 0; i < mesh.triangles.size(); ++i)
         for (const std::uint32_t corner : mesh.triangles[i])
             if (corner >= mesh.positions.size())

@@ -1,8 +1,10 @@
 #include <algorithm>
+#include <array>
 #include <bit>
 #include <cctype>
 #include <cmath>
 #include <limits>
+#include <random>
 
 #include "mesh_out/io/binary_detail.h"
 #include "mesh_out/io/mesh_formats_detail.h"
@@ -16,10 +18,16 @@ namespace {
 constexpr std::size_t kHeaderBytes = 80, kFirstRecord = 84, kRecordBytes = 50;
 
 /// Gives bit-equal positions one index, in the order of their first appearance: a hash table with
-/// open addressing, because a large STL has tens of millions of corners.
+/// open addressing, because a large STL has tens of millions of corners. Its hash is one drawn from
+/// a universal family (multiply and shift), so that no file can be made whose positions all fall
+/// together; the indices do not depend on it.
 class Welder {
 public:
-    explicit Welder(std::vector<Vec3>& positions) : positions_(positions), slots_(64, kEmpty) {}
+    explicit Welder(std::vector<Vec3>& positions) : positions_(positions), slots_(64, kEmpty) {
+        std::random_device random;
+        for (std::uint64_t& key : keys_)
+            key = std::uint64_t{random()} << 32 | random();
+    }
 
     std::uint32_t index(Vec3 p) {
         p += Vec3{0, 0, 0}; // -0 becomes +0
@@ -40,12 +48,12 @@ private:
     static constexpr std::uint32_t kEmpty = std::numeric_limits<std::uint32_t>::max();
 
     std::size_t first_slot(const Vec3& p) const {
-        std::uint64_t hash = 0;
-        for (int axis = 0; axis < 3; ++axis) {
-            hash = (hash ^ std::bit_cast<std::uint64_t>(p[axis])) * 0x9e3779b97f4a7c15u;
-            hash ^= hash >> 32;
+        std::uint64_t hash = keys_[6];
+        for (std::size_t axis = 0; axis < 3; ++axis) {
+            const auto bits = std::bit_cast<std::uint64_t>(p[static_cast<int>(axis)]);
+            hash += keys_[2 * axis] * (bits >> 32) + keys_[2 * axis + 1] * (bits & 0xffffffffu);
         }
-        return hash & (slots_.size() - 1);
+        return static_cast<std::size_t>(hash >> 32) & (slots_.size() - 1);
     }
 
     void grow() {
@@ -59,7 +67,8 @@ private:
     }
 
     std::vector<Vec3>& positions_;
-    std::vector<std::uint32_t> slots_;
+    std::vector<std::uint32_t> slots_; ///< a power of 2 of them
+    std::array<std::uint64_t, 7> keys_{};
 };
 
 void parse_binary(std::string_view bytes, const std::string& where, MeshFile& file,

@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "stats/core/error.h"
+#include "stats/core/replacing_detail.h"
 #include "stats/core/temporary_detail.h"
 #include "stats/core/text.h"
 
@@ -51,6 +52,7 @@ std::string read_file(const fs::path& path, std::size_t max_bytes) {
         throw Error(Fault::bad_input, path.string() + ": " + std::to_string(size) +
                                           " bytes, at most " + std::to_string(max_bytes) +
                                           " are read; split or reduce it");
+    note_read(file.value());
     std::string bytes(size, '\0');
     bytes.resize(read_all(file.value(), 0, bytes, path));
     return bytes;

@@ -18,8 +18,9 @@ std::string read_file(const std::filesystem::path& path,
 /// A file that takes its name when it is whole: until publish() it is a temporary in the same
 /// folder (`.taihu-tmp-` and six letters), which goes with this object. What a program that was
 /// killed left there is removed by the next that writes into the folder.
-/// Every member throws Error io, with the path and the system's reason; an earlier file of this
-/// name is then untouched.
+/// An earlier file of this name gives it its rights; a link of this name is replaced, not what it
+/// points to. Every member throws Error io, with the path and the system's reason; an earlier file
+/// is then untouched.
 class OutputFile {
 public:
     /// \throws Error io  also when `path` is there and no regular file.
@@ -28,6 +29,7 @@ public:
     OutputFile(const OutputFile&) = delete;
     OutputFile& operator=(const OutputFile&) = delete;
 
+    const std::filesystem::path& path() const { return path_; }
     std::uint64_t size() const { return size_; } ///< written so far [bytes]
     void write(std::string_view bytes);
     /// Writes over what is there, from `at` on.
@@ -38,7 +40,8 @@ public:
     /// All of it on the disk, still under the other name: for several files, of which none shall
     /// be seen before all are whole.
     void finish();
-    /// finish(), then takes the place of what has its name, in one step.
+    /// finish(), then takes the place of what has its name, in one step. \throws Error also as
+    /// require_replaceable().
     void publish();
 
 private:

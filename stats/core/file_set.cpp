@@ -4,10 +4,12 @@
 #include <cerrno>
 #include <cstdio>
 #include <fcntl.h>
+#include <sys/file.h>
 #include <system_error>
 #include <utility>
 
 #include "stats/core/error.h"
+#include "stats/core/replacing_detail.h"
 #include "stats/core/sha256.h"
 #include "stats/core/temporary_detail.h"
 
@@ -62,13 +64,29 @@ void place_new(Temporary& folder, const fs::path& goal) {
     sync_folder(folder_of(goal));
 }
 
-/// \throws Error io: there is such a name, and it is no file.
-void require_replaceable(const fs::path& path) {
+/// \throws Error also io: there is such a name, and it is no file.
+void require_replaceable_file(const fs::path& path) {
+    require_replaceable(path);
     std::error_code ignored;
     if (fs::exists(path, ignored) && !fs::is_regular_file(path, ignored))
         throw Error(Fault::io, path.string() + ": is no regular file, and would be replaced; "
                                                "choose another folder");
 }
+
+/// While it lives, other programs that publish into this folder wait: their sets do not mix.
+class FolderLock {
+public:
+    explicit FolderLock(const fs::path& folder)
+        : opened_(::open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC)) {
+        std::error_code failed; // a temporary one is locked by its owner, which is this program
+        const fs::path whole = fs::canonical(folder, failed);
+        if (opened_.value() >= 0 && !failed && !is_temporary(whole.filename().string()))
+            ::flock(opened_.value(), LOCK_EX);
+    }
+
+private:
+    Descriptor opened_;
+};
 
 /// Renames in one step each, and undone unless they are kept.
 class Renames {
@@ -94,8 +112,7 @@ public:
             return done_.push_back({from, to, RENAME_EXCHANGE});
         // There is nothing to swap, or the file system cannot: then there is no way back.
         const bool is_first = errno == ENOENT;
-        if (::rename(from.c_str(), to.c_str()) != 0)
-            fail_io(to, "cannot replace", errno);
+        take_place(from, to);
         if (is_first)
             done_.push_back({from, to, 0});
     }
@@ -156,8 +173,13 @@ void FileSet::publish(const std::string& last, std::span<const std::string> gone
     const Publishing together;
     if (is_new_)
         return place_new(*temporary_, folder_);
+    const FolderLock alone(folder_);
     std::vector<std::string> names = files_in(temporary_->path());
-    for (const std::string& name : names)
+    for (const std::string& name : names) {
+        require_replaceable_file(folder_ / name);
+        copy_rights(folder_ / name, temporary_->path() / name);
+    }
+    for (const std::string& name : gone)
         require_replaceable(folder_ / name);
     std::erase(names, last);
     std::error_code ignored; // the renames will say so
@@ -173,6 +195,9 @@ void FileSet::publish(const std::string& last, std::span<const std::string> gone
     renames.swap(temporary_->path() / last, folder_ / last);
     sync_folder(folder_);
     renames.keep();
+    names.push_back(last);
+    for (const std::string& name : names)
+        note_published(folder_ / name);
 }
 
 void OutputFiles::add(const fs::path& path, std::string_view bytes) {
@@ -185,6 +210,8 @@ void OutputFiles::add(const fs::path& path, std::string_view bytes) {
 
 void OutputFiles::publish() {
     const Publishing together;
+    for (const OutputFile& file : files_)
+        require_replaceable(file.path()); // all or none
     for (OutputFile& file : files_)
         file.publish();
     files_.clear();
@@ -211,6 +238,7 @@ void WorkFolder::publish() {
         temporary_->rename(goal_);
         renames.keep();
     }
+    note_published(goal_);
     sync_folder(folder_of(goal_));
 }
 

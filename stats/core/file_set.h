@@ -38,7 +38,7 @@ public:
 
     /// Into the folder, all at once where it is new; else one after another, `last` as the last and
     /// its namesake first out of the way. When one of them cannot be replaced, all that went before
-    /// is undone.
+    /// is undone. Another program that publishes into the folder waits for this one.
     /// \param gone  names of an earlier set, which are removed.
     void publish(const std::string& last, std::span<const std::string> gone = {});
 
@@ -53,7 +53,8 @@ class OutputFiles {
 public:
     /// Written aside, as an OutputFile; not at all without a name. \throws Error io.
     void add(const std::filesystem::path& path, std::string_view bytes);
-    /// In the order in which they were added. \throws Error io.
+    /// In the order in which they were added. \throws Error io, or before any as
+    /// require_replaceable().
     void publish();
 
 private:

@@ -1,5 +1,6 @@
 #include "stats/core/temporary_detail.h"
 
+#include <algorithm>
 #include <array>
 #include <cerrno>
 #include <chrono>
@@ -18,6 +19,7 @@
 #include "stats/core/error.h"
 #include "stats/core/file.h"
 #include "stats/core/file_set.h"
+#include "stats/core/replacing_detail.h"
 
 namespace taihu {
 namespace {
@@ -135,8 +137,7 @@ void Temporary::discard() const {
 
 void Temporary::rename(const fs::path& to) {
     const std::lock_guard lock(live().guard);
-    if (::rename(path_.c_str(), to.c_str()) != 0)
-        fail_io(to, "cannot replace", errno);
+    take_place(path_, to);
     path_.clear();
 }
 
@@ -156,7 +157,9 @@ Publishing::~Publishing() {
 }
 
 bool is_temporary(const std::string& name) {
-    return name.starts_with(kPrefix) && name.size() == kPrefix.size() + kNLetters;
+    return name.starts_with(kPrefix) && name.size() == kPrefix.size() + kNLetters &&
+           std::all_of(name.begin() + kPrefix.size(), name.end(),
+                       [](char c) { return c >= 'a' && c <= 'z'; });
 }
 
 fs::path folder_of(const fs::path& path) {

@@ -35,7 +35,7 @@ public:
 
     const std::filesystem::path& path() const { return path_; }
     int descriptor() const { return descriptor_.value(); }
-    /// Takes the place of a file, or of an empty folder or none. \throws Error io.
+    /// Takes the place of a file, or of an empty folder or none. \throws Error as take_place().
     void rename(const std::filesystem::path& to);
 
     /// Removes it already now.

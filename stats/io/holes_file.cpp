@@ -9,6 +9,14 @@
 #include "stats/number_detail.h"
 
 namespace taihu {
+namespace {
+
+bool is_near(const Vec3& p) {
+    return std::abs(p.x) <= kMostLength_m && std::abs(p.y) <= kMostLength_m &&
+           std::abs(p.z) <= kMostLength_m;
+}
+
+} // namespace
 
 std::vector<Sphere> read_holes(const std::filesystem::path& path) {
     static constexpr std::array<std::string_view, 5> kKnown = {"x_m", "y_m", "z_m", "radius_m",
@@ -28,8 +36,14 @@ std::vector<Sphere> read_holes(const std::filesystem::path& path) {
         const double radius = table.number(row, size) * (diameter ? 0.5 : 1);
         if (!(radius > 0))
             table.refuse(row, size, "must be > 0, drop the row or fix the number");
-        holes.push_back(
-            {{table.number(row, x), table.number(row, y), table.number(row, z)}, radius});
+        if (!(radius <= kMostLength_m))
+            table.refuse(row, size, "must be at most 1e6 m, drop the row or check the unit");
+        const Vec3 center{table.number(row, x), table.number(row, y), table.number(row, z)};
+        if (!is_near(center))
+            table.refuse(row, x,
+                         "and the places beside it must be within 1e6 m, drop the row or "
+                         "check the unit");
+        holes.push_back({center, radius});
     }
     return holes;
 }
@@ -48,10 +62,11 @@ std::string format_holes(std::span<const Sphere> holes, std::span<const std::str
     text += "x_m,y_m,z_m,radius_m\n";
     for (std::size_t i = 0; i < holes.size(); ++i) {
         const Sphere& hole = holes[i];
-        if (!is_finite(hole.center) || !(hole.radius_m > 0 && std::isfinite(hole.radius_m)))
+        if (!(hole.radius_m > 0 && hole.radius_m <= kMostLength_m) || !is_near(hole.center))
             throw Error(Fault::bad_argument, "holes[" + std::to_string(i) + "]: radius_m is " +
                                                  shortest(hole.radius_m) +
-                                                 "; centre and radius must be finite, radius > 0");
+                                                 "; centre and radius must be within 1e6 m, "
+                                                 "radius > 0");
         for (const double value : {hole.center.x, hole.center.y, hole.center.z})
             text += shortest(value) + ',';
         text += shortest(hole.radius_m) + '\n';

@@ -15,6 +15,8 @@ using nlohmann::json;
 
 // One takes up to 100 bytes of memory however few bytes of text it has.
 constexpr std::size_t kMostValues = 8'000'000;
+// Keys in their order are sought one by one.
+constexpr std::size_t kMostOrderedKeys = 1000;
 
 [[noreturn]] void refuse(const std::string& where, const std::string& what) {
     throw Error(Fault::bad_input, where + ": " + what);
@@ -54,7 +56,8 @@ std::string key_text(std::string_view quoted) {
 
 // One pass over the brackets and keys of text that may not be JSON at all: the parser itself would
 // take any depth, and would keep the last of equal keys.
-void check_nesting(std::string_view text, std::string_view where, std::size_t max_depth) {
+void check_nesting(std::string_view text, std::string_view where, std::size_t max_depth,
+                   std::size_t max_keys) {
     struct Level {
         bool object;
         bool key_next;
@@ -83,6 +86,9 @@ void check_nesting(std::string_view text, std::string_view where, std::size_t ma
                 if (!levels.back().keys.insert(key_text(quoted)).second)
                     refuse(place(where, text, i),
                            "key " + printable(quoted) + " is there twice; keep one of them");
+                if (levels.back().keys.size() > max_keys)
+                    refuse(place(where, text, i), "an object of more than " +
+                                                      std::to_string(max_keys) + " keys; split it");
                 levels.back().key_next = false;
             }
             i = end;
@@ -92,16 +98,15 @@ void check_nesting(std::string_view text, std::string_view where, std::size_t ma
     }
 }
 
-} // namespace
-
-json parse_json(std::string_view text, std::string_view where, std::size_t max_bytes,
-                std::size_t max_depth) {
+template <class Json>
+Json parse(std::string_view text, std::string_view where, std::size_t max_bytes,
+           std::size_t max_depth, std::size_t max_keys) {
     if (text.size() > max_bytes)
         refuse(std::string(where), std::to_string(text.size()) + " bytes of JSON, at most " +
                                        std::to_string(max_bytes) + " are read; reduce it");
-    check_nesting(text, where, max_depth);
+    check_nesting(text, where, max_depth, max_keys);
     try {
-        return json::parse(text.begin(), text.end());
+        return Json::parse(text.begin(), text.end());
     } catch (const json::parse_error& e) {
         std::string_view what = e.what(); // `[...] parse error at line 1, column 2: ...`
         what.remove_prefix(std::min(what.find(": ") + 2, what.size()));
@@ -112,10 +117,16 @@ json parse_json(std::string_view text, std::string_view where, std::size_t max_b
     }
 }
 
+} // namespace
+
+json parse_json(std::string_view text, std::string_view where, std::size_t max_bytes,
+                std::size_t max_depth) {
+    return parse<json>(text, where, max_bytes, max_depth, text.size());
+}
+
 nlohmann::ordered_json parse_ordered_json(std::string_view text, std::string_view where,
                                           std::size_t max_bytes, std::size_t max_depth) {
-    parse_json(text, where, max_bytes, max_depth); // refuses what the other parser would let pass
-    return nlohmann::ordered_json::parse(text.begin(), text.end());
+    return parse<nlohmann::ordered_json>(text, where, max_bytes, max_depth, kMostOrderedKeys);
 }
 
 void check_keys(const json& object, const std::string& where,

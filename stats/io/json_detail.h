@@ -18,7 +18,7 @@ nlohmann::json parse_json(std::string_view text, std::string_view where,
                           std::size_t max_bytes = std::size_t{64} << 20,
                           std::size_t max_depth = 64);
 
-/// The same with the keys in their order.
+/// The same with the keys in their order, of which no object may have more than 1000.
 nlohmann::ordered_json parse_ordered_json(std::string_view text, std::string_view where,
                                           std::size_t max_bytes = std::size_t{64} << 20,
                                           std::size_t max_depth = 64);

@@ -78,7 +78,8 @@ TEST(OutputFile, ReplacesNoDeviceAndNoPipe) {
 TEST(OutputFile, SweepsWhatNobodyHoldsAndNothingElse) {
     const Scratch scratch;
     std::filesystem::create_directories(scratch / ".taihu-tmp-aaaaaa/deep");
-    for (const char* name : {".taihu-tmp-bbbbbb", ".taihu-tmp-cccccc", ".taihu-tmp-sevenly"})
+    for (const char* name : {".taihu-tmp-bbbbbb", ".taihu-tmp-cccccc", ".taihu-tmp-sevenly",
+                             ".taihu-tmp-BACKUP", ".taihu-tmp-1.json"})
         std::ofstream(scratch / name) << "left behind";
     const int held = ::open((scratch / ".taihu-tmp-bbbbbb").c_str(), O_RDONLY | O_CLOEXEC);
     ASSERT_EQ(::flock(held, LOCK_EX), 0);
@@ -86,7 +87,8 @@ TEST(OutputFile, SweepsWhatNobodyHoldsAndNothingElse) {
     EXPECT_FALSE(std::filesystem::exists(scratch / ".taihu-tmp-aaaaaa"));
     EXPECT_TRUE(std::filesystem::exists(scratch / ".taihu-tmp-bbbbbb")); // somebody writes it
     EXPECT_FALSE(std::filesystem::exists(scratch / ".taihu-tmp-cccccc"));
-    EXPECT_TRUE(std::filesystem::exists(scratch / ".taihu-tmp-sevenly")); // not one of ours
+    for (const char* name : {".taihu-tmp-sevenly", ".taihu-tmp-BACKUP", ".taihu-tmp-1.json"})
+        EXPECT_TRUE(std::filesystem::exists(scratch / name)) << name; // not one of ours
     ::close(held);
 }
 

@@ -92,8 +92,13 @@ TEST(Foreign, StopsWhenItIsTold) {
 TEST(Foreign, TheProgramRefusesWhatItIsNotMadeFor) {
     expect_error(Fault::bad_input, "file: damaged",
                  [] { read_foreign("no such kind", "x", "file"); });
-    expect_error(Fault::bad_input, "file: not a Draco stream",
-                 [] { read_foreign("draco", "x", "file"); });
+    FlatWriter one;
+    one.put<std::uint64_t>(1);
+    one.put_text("file:byte 7");
+    one.put_text("x");
+    expect_error(Fault::bad_input, "file:byte 7: not a Draco stream",
+                 [&] { read_foreign("draco", one.bytes, "file"); });
+    expect_error(Fault::bad_input, "file: damaged", [] { read_foreign("draco", "x", "file"); });
 }
 
 TEST(Flat, GivesBackWhatWasPut) {

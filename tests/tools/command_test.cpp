@@ -137,9 +137,11 @@ TEST(Command, ASignalCancelsAndLeavesNothing) {
     for (const auto& [signal, code] : {std::pair("INT", 130), std::pair("TERM", 143)}) {
         // In the foreground, or the whole group gets a second signal. Long enough to have started,
         // on a job that takes many seconds (and 2 GB).
-        const Finished said = run(std::string("timeout --foreground --preserve-status -s ") +
-                                      signal + " 1 taihu shape boulder --dim 3000 -o big.vdb",
-                                  scratch.path());
+        const Finished said =
+            run(std::string(
+                    "env --default-signal=INT,TERM timeout --foreground --preserve-status -s ") +
+                    signal + " 1 taihu shape boulder --dim 3000 -o big.vdb",
+                scratch.path());
         EXPECT_EQ(said.exit_code, code);
         EXPECT_THAT(said.err, HasSubstr("stopped; no output was written")); // caught, not killed
         EXPECT_EQ(std::distance(std::filesystem::directory_iterator(scratch.path()), {}), 0);

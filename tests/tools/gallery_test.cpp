@@ -95,6 +95,10 @@ TEST(Gallery, ReplacesAnEarlierOneAndNothingElse) {
     EXPECT_EQ(refused.exit_code, 1);
     EXPECT_THAT(refused.err, HasSubstr("mine: a folder with other files; choose a new one"));
     EXPECT_EQ(read_file(scratch / "mine/letter.txt"), "dear");
+    write_file(scratch / "plates/E50/letter.txt", "dear");
+    EXPECT_THAT(run("taihu gallery --only E50 -o plates", scratch.path()).err,
+                HasSubstr("plates/E50/letter.txt: is not of the gallery"));
+    EXPECT_EQ(read_file(scratch / "plates/E50/letter.txt"), "dear");
     // Nothing that it worked in is left.
     for (const auto& file : std::filesystem::directory_iterator(scratch.path()))
         EXPECT_THAT(file.path().filename().string(), testing::AnyOf("plates", "mine"));
@@ -102,9 +106,9 @@ TEST(Gallery, ReplacesAnEarlierOneAndNothingElse) {
 
 TEST(Gallery, StoppedItLeavesNothing) {
     const Scratch scratch; // the row takes some seconds
-    const Finished stopped =
-        run("timeout --foreground --preserve-status -s INT 0.5 taihu gallery --only D20",
-            scratch.path());
+    const Finished stopped = run("env --default-signal=INT timeout --foreground --preserve-status "
+                                 "-s INT 0.5 taihu gallery --only D20",
+                                 scratch.path());
     EXPECT_EQ(stopped.exit_code, 130) << stopped.err;
     EXPECT_TRUE(std::filesystem::is_empty(scratch.path()));
 }

