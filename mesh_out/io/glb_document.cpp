@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <set>
 
 #include "mesh_out/io/binary_detail.h"
 #include "stats/core/error.h"
@@ -242,6 +243,20 @@ std::string_view GlbDocument::view(std::uint64_t index) const {
                  std::to_string(data.size()),
              "export it again");
     return data.substr(first, size);
+}
+
+std::vector<std::uint64_t> GlbDocument::draco_views() const {
+    std::set<std::uint64_t> views;
+    const Json* meshes = find(root_, "meshes");
+    for (std::size_t m = 0; meshes && m < meshes->size(); ++m) {
+        const Json* primitives = find(item("meshes", m), "primitives");
+        for (std::size_t i = 0; primitives && primitives->is_array() && i < primitives->size(); ++i)
+            if (const Json* extensions = find((*primitives)[i], "extensions"))
+                if (const Json* draco = find(*extensions, kGltfDraco))
+                    views.insert(
+                        needed_whole(*draco, "bufferView", "meshes[" + std::to_string(m) + ']'));
+    }
+    return {views.begin(), views.end()};
 }
 
 GltfAccessor GlbDocument::accessor(std::uint64_t index) const {

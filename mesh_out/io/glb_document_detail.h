@@ -11,6 +11,8 @@ namespace taihu {
 
 inline constexpr std::uint32_t kGlbMagic = 0x46546c67, kGlbJson = 0x4e4f534a, kGlbBin = 0x004e4942;
 
+inline constexpr const char* kGltfDraco = "KHR_draco_mesh_compression";
+
 /// glTF's names of number types.
 enum GltfType : std::uint64_t {
     kGltfByte = 5120,
@@ -75,6 +77,9 @@ public:
     std::size_t offset(std::string_view part) const {
         return static_cast<std::size_t>(part.data() - bytes_.data());
     }
+
+    /// The buffer views of all Draco streams, each once.
+    std::vector<std::uint64_t> draco_views() const;
 
     GltfAccessor accessor(std::uint64_t index) const;
     GltfArray array(std::uint64_t accessor_index) const;

@@ -20,7 +20,6 @@ constexpr std::size_t kMaxLevels = 16;
 /// Small files may place a mesh many times, but not without end.
 constexpr std::size_t kFreeItems = std::size_t{1} << 24;
 constexpr std::uint64_t kPrimitiveItems = 16; ///< what one costs that has no vertex
-constexpr const char* kDraco = "KHR_draco_mesh_compression";
 /// Encoders that state the bounds of their input are off by half a step of their quantisation;
 /// 1/256 of the largest side is that of 7 bits, coarser than any in use.
 constexpr double kBoundsTolerance = 1.0 / 256;
@@ -101,7 +100,7 @@ void GlbReader::check_extensions() const {
     const Json* required = document_.find(document_.root(), "extensionsRequired");
     if (!required)
         return;
-    static constexpr std::array<std::string_view, 3> kKnown = {kDraco, "KHR_mesh_quantization",
+    static constexpr std::array<std::string_view, 3> kKnown = {kGltfDraco, "KHR_mesh_quantization",
                                                                "MSFT_lod"};
     static constexpr std::array<std::string_view, 3> kLooksOnly = {"KHR_materials_", "KHR_texture_",
                                                                    "EXT_texture_"};
@@ -313,7 +312,7 @@ void GlbReader::read_primitive(const Json& primitive, const std::string& path,
     if (mode > kFan)
         document_.fail(path + ".mode is " + std::to_string(mode), "export it again");
     if (const Json* extensions = document_.find(primitive, "extensions"))
-        if (const Json* draco = document_.find(*extensions, kDraco)) {
+        if (const Json* draco = document_.find(*extensions, kGltfDraco)) {
             if (mode != kTriangles)
                 document_.refuse(path + " is a Draco strip", "export triangles");
             read_draco(primitive, *draco, path, placement, level);
@@ -431,34 +430,19 @@ void GlbReader::check_draco(const DracoMesh& decoded, const Json& primitive, con
 
 /// Those of all meshes at once: a file may have hundreds, and each call starts a program.
 void GlbReader::decode_streams() {
+    const std::vector<std::uint64_t> views = document_.draco_views();
     std::vector<DracoStream> streams;
-    std::vector<DracoMesh*> into;
     std::size_t n_bytes = 0;
-    const std::size_t n_meshes = document_.find(document_.root(), "meshes")->size();
-    for (std::size_t m = 0; m < n_meshes; ++m) {
-        const Json* primitives = document_.find(document_.item("meshes", m), "primitives");
-        if (!primitives)
-            continue;
-        for (const Json& primitive : *primitives) {
-            const Json* extensions = document_.find(primitive, "extensions");
-            const Json* draco = extensions ? document_.find(*extensions, kDraco) : nullptr;
-            if (!draco)
-                continue;
-            const auto view = document_.needed_whole(*draco, "bufferView", path_of("meshes", m));
-            const auto [place, is_new] = draco_.try_emplace(view);
-            if (!is_new)
-                continue;
-            const std::string_view bytes = document_.view(view);
-            n_bytes += bytes.size();
-            if (n_bytes > document_.n_bytes())
-                document_.fail("its Draco streams overlap", "export it again");
-            streams.push_back({bytes, where_ + ":byte " + std::to_string(document_.offset(bytes))});
-            into.push_back(&place->second);
-        }
+    for (const std::uint64_t view : views) {
+        const std::string_view bytes = document_.view(view);
+        n_bytes += bytes.size();
+        if (n_bytes > document_.n_bytes())
+            document_.fail("its Draco streams overlap", "export it again");
+        streams.push_back({bytes, where_ + ":byte " + std::to_string(document_.offset(bytes))});
     }
     std::vector<DracoMesh> meshes = taihu::read_draco(streams, where_, is_own_, progress_);
-    for (std::size_t i = 0; i < meshes.size(); ++i)
-        *into[i] = std::move(meshes[i]);
+    for (std::size_t i = 0; i < views.size(); ++i)
+        draco_[views[i]] = std::move(meshes[i]);
 }
 
 void GlbReader::read_draco(const Json& primitive, const Json& extension, const std::string& path,
