@@ -30,6 +30,14 @@ void check_settings(const Sample& sample, Family family, const FitSettings& sett
     if (!(*settings.resolution > 0 && std::isfinite(*settings.resolution)))
         throw Error(Fault::bad_argument, "fit: resolution is " + shortest(*settings.resolution) +
                                              "; must be finite and > 0");
+    if (const double greatest =
+            sample.diameters.empty()
+                ? *settings.resolution
+                : *std::max_element(sample.diameters.begin(), sample.diameters.end());
+        *settings.resolution > greatest || *settings.resolution < 1e-9 * greatest)
+        throw Error(Fault::bad_argument, "fit: resolution is " + shortest(*settings.resolution) +
+                                             "; must be at most the greatest profile, " +
+                                             shortest(greatest) + ", and 1e-9 of it or more");
     if (!sample.bins.empty())
         throw Error(Fault::bad_argument, "fit: a resolution of " + shortest(*settings.resolution) +
                                              " for a sample in bins; leave it out");

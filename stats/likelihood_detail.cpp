@@ -60,6 +60,15 @@ double interpolate(double f, Value value) {
            (ab * cd * g / 24) * value(2) + (ab * cd * e / 120) * value(3);
 }
 
+// The same, but straight beside values that stand for nothing: a polynomial would swing over them.
+template <class Value>
+double between(double f, Value value) {
+    for (int k = -2; k <= 3; ++k)
+        if (value(k) <= kNothing)
+            return (1 - f) * value(0) + f * value(1);
+    return interpolate(f, value);
+}
+
 } // namespace
 
 std::optional<ShapeRange> shape_range(Family family) {
@@ -217,7 +226,7 @@ double UnitSection::log_pdf(double x) const {
         return section_.log_pdf(std::exp(x));
     const double at = x / spacing_, i = std::floor(at);
     const Node* node = nodes_.data() + (static_cast<std::ptrdiff_t>(i) - first_);
-    return interpolate(at - i, [&](int k) { return node[k].log_pdf; });
+    return between(at - i, [&](int k) { return node[k].log_pdf; });
 }
 
 double UnitSection::log_survival(double x) const {
@@ -227,7 +236,7 @@ double UnitSection::log_survival(double x) const {
         return 0;
     const double at = x / spacing_, i = std::floor(at);
     const Node* node = nodes_.data() + (static_cast<std::ptrdiff_t>(i) - first_);
-    return std::min(0.0, interpolate(at - i, [&](int k) { return node[k].log_survival; }));
+    return std::min(0.0, between(at - i, [&](int k) { return node[k].log_survival; }));
 }
 
 Likelihood::Likelihood(const Sample& sample, const Detection& detection, Family family,

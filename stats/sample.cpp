@@ -71,6 +71,8 @@ void check_frames(const Sample& sample) {
                shortest(sum) + "; leave it out");
 }
 
+constexpr double kLeastLimit = 1e-9; // of the smallest profile
+
 // check_sample's end: what needs the profiles to be sound.
 double checked_limit(const Sample& sample) {
     double limit = sample.detection_limit.value_or(smallest(sample));
@@ -78,6 +80,11 @@ double checked_limit(const Sample& sample) {
         limit = detection_limit(sample, sample.frames.front());
     for (const Frame& frame : sample.frames)
         limit = std::min(limit, detection_limit(sample, frame));
+    if (limit > 0 && limit < kLeastLimit * smallest(sample))
+        refuse("detection limit is " + shortest(limit) +
+               ", less than a billionth of the smallest "
+               "profile, " +
+               shortest(smallest(sample)) + "; give a larger one, or 0");
     if (!(limit <= smallest(sample)))
         refuse("detection limit is " + shortest(limit) + " but the smallest profile is " +
                shortest(smallest(sample)) + "; the limit must be >= 0 and not above it");

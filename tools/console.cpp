@@ -212,8 +212,12 @@ void Console::result(const nlohmann::ordered_json& object) const {
         return;
     }
     const auto replace = nlohmann::ordered_json::error_handler_t::replace; // names may be any bytes
-    if (json && (std::printf("%s\n", object.dump(-1, ' ', false, replace).c_str()) < 0 ||
-                 std::fflush(stdout) != 0))
+    if (!json || (std::printf("%s\n", object.dump(-1, ' ', false, replace).c_str()) >= 0 &&
+                  std::fflush(stdout) == 0))
+        return;
+    if (errno == EPIPE) // one who has read enough may close the pipe
+        std::clearerr(stdout);
+    else
         throw Error(Fault::io, "stdout: cannot write; check where it goes");
 }
 

@@ -207,7 +207,7 @@ std::string counted(std::size_t n, const char* what) {
     else if (d.n_sheets == 0)
         what = "none of its " + counted(d.n_faces, "face") +
                " has three corners that are there, finite and different; export it again";
-    else if (d.rule == CloseRule::plane || d.n_open_edges == 0)
+    else if (d.rule == CloseRule::plane || d.n_open_edges == 0 || !(d.area_m2 > 0))
         what = counted(d.n_sheets, "sheet") + " without volume; give the mesh a thickness";
     else {
         char share[32];

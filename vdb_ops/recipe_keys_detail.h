@@ -14,12 +14,13 @@
 #include "stats/core/error.h"
 #include "stats/core/text.h"
 #include "stats/core/vec3.h"
-#include "stats/io/holes_file.h"
 #include "stats/io/json_detail.h"
 #include "stats/number_detail.h"
 #include "vdb_ops/recipe_parse_detail.h"
 
 namespace taihu {
+
+inline constexpr double kMostLength_m = 1e6; // lengths and places
 
 [[noreturn]] inline void refuse(const std::string& where, const std::string& what) {
     throw Error(Fault::bad_input, where + ": " + what);

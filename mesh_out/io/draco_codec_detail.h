@@ -48,10 +48,11 @@ struct DracoStream {
     std::string where;
 };
 
-/// decode_draco_mesh() of each: of all in one program of its own, unless they are our own.
-/// \param where  the file. \throws Error also as read_foreign().
+/// decode_draco_mesh() of each: of up to 32 in one program of its own, unless they are our own.
+/// \param where  the file. \param most_items  vertices and triangles of all together.
+/// \throws Error bad_input: more than those; also as read_foreign().
 std::vector<DracoMesh> read_draco(std::span<const DracoStream> streams, const std::string& where,
-                                  bool is_own, Progress* progress);
+                                  bool is_own, std::size_t most_items, Progress* progress);
 
 /// What encode_draco() made of a textured mesh.
 TexturedMesh decode_textured_draco(std::string_view bytes, const std::string& where);

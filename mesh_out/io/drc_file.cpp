@@ -1,4 +1,5 @@
 #include <cmath>
+#include <limits>
 
 #include "mesh_out/io/draco_codec_detail.h"
 #include "mesh_out/io/glb.h"
@@ -9,9 +10,10 @@ namespace taihu {
 
 MeshFile parse_drc(std::string_view bytes, const std::string& where, bool is_own,
                    Progress* progress) {
+    constexpr std::size_t kNoLimit = std::numeric_limits<std::size_t>::max(); // but its program's
     const DracoStream whole{bytes, where + ":byte 0"};
     DracoMesh decoded =
-        std::move(read_draco(std::span(&whole, 1), where, is_own, progress).front());
+        std::move(read_draco(std::span(&whole, 1), where, is_own, kNoLimit, progress).front());
     MeshFile file;
     file.draco = true;
     file.recipe = std::move(decoded.recipe);

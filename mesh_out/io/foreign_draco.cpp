@@ -2,6 +2,7 @@
 
 #include "mesh_out/io/draco_codec_detail.h"
 #include "mesh_out/io/foreign_formats_detail.h"
+#include "stats/core/error.h"
 #include "stats/core/flat.h"
 #include "stats/core/foreign.h"
 
@@ -65,14 +66,11 @@ std::string flat_draco(std::string_view bytes, const std::string& where,
     return std::move(out.bytes);
 }
 
-std::vector<DracoMesh> read_draco(std::span<const DracoStream> streams, const std::string& where,
-                                  bool is_own, Progress* progress) {
-    std::vector<DracoMesh> meshes;
-    if (is_own) {
-        for (const DracoStream& s : streams)
-            meshes.push_back(decode_draco_mesh(s.bytes, s.where));
-        return meshes;
-    }
+namespace {
+
+/// Of some streams in one program.
+std::vector<DracoMesh> read_batch(std::span<const DracoStream> streams, const std::string& where,
+                                  Progress* progress) {
     FlatWriter all;
     all.put<std::uint64_t>(streams.size());
     for (const DracoStream& s : streams) {
@@ -82,9 +80,48 @@ std::vector<DracoMesh> read_draco(std::span<const DracoStream> streams, const st
     const std::string& place = streams.size() == 1 ? streams.front().where : where;
     const std::string flat = read_foreign("draco", all.bytes, place, {}, progress);
     FlatReader in(flat, place);
+    std::vector<DracoMesh> meshes;
     for (std::size_t i = 0; i < streams.size(); ++i)
         meshes.push_back(get_mesh(in));
     in.expect_end();
+    return meshes;
+}
+
+/// In halves where all are more than a program may take, which is meant for one.
+void read_all(std::span<const DracoStream> streams, const std::string& where, Progress* progress,
+              std::vector<DracoMesh>& into) {
+    try {
+        for (DracoMesh& mesh : read_batch(streams, where, progress))
+            into.push_back(std::move(mesh));
+    } catch (const Error& e) {
+        if (e.fault() != Fault::bad_input || streams.size() == 1)
+            throw;
+        read_all(streams.first(streams.size() / 2), where, progress, into);
+        read_all(streams.subspan(streams.size() / 2), where, progress, into);
+    }
+}
+
+} // namespace
+
+std::vector<DracoMesh> read_draco(std::span<const DracoStream> streams, const std::string& where,
+                                  bool is_own, std::size_t most_items, Progress* progress) {
+    constexpr std::size_t kBatch = 32;
+    std::vector<DracoMesh> meshes;
+    std::size_t n_items = 0;
+    for (std::size_t first = 0; first < streams.size(); first += kBatch) {
+        const auto batch = streams.subspan(first, std::min(kBatch, streams.size() - first));
+        if (!is_own)
+            read_all(batch, where, progress, meshes);
+        for (const DracoStream& s : batch)
+            if (is_own)
+                meshes.push_back(decode_draco_mesh(s.bytes, s.where));
+        for (std::size_t i = first; i < meshes.size(); ++i)
+            n_items += meshes[i].mesh.positions.size() + meshes[i].mesh.triangles.size();
+        if (n_items > most_items)
+            throw Error(Fault::bad_input, where + ": its Draco streams unfold into over " +
+                                              std::to_string(most_items) +
+                                              " vertices and triangles; split the file");
+    }
     return meshes;
 }
 

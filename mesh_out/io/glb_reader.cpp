@@ -440,7 +440,8 @@ void GlbReader::decode_streams() {
             document_.fail("its Draco streams overlap", "export it again");
         streams.push_back({bytes, where_ + ":byte " + std::to_string(document_.offset(bytes))});
     }
-    std::vector<DracoMesh> meshes = taihu::read_draco(streams, where_, is_own_, progress_);
+    std::vector<DracoMesh> meshes = taihu::read_draco(
+        streams, where_, is_own_, std::max(kFreeItems, document_.n_bytes()), progress_);
     for (std::size_t i = 0; i < views.size(); ++i)
         draco_[views[i]] = std::move(meshes[i]);
 }

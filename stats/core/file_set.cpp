@@ -2,10 +2,13 @@
 
 #include <algorithm>
 #include <cerrno>
+#include <chrono>
 #include <cstdio>
 #include <fcntl.h>
+#include <optional>
 #include <sys/file.h>
 #include <system_error>
+#include <thread>
 #include <utility>
 
 #include "stats/core/error.h"
@@ -73,15 +76,19 @@ void require_replaceable_file(const fs::path& path) {
                                                "choose another folder");
 }
 
-/// While it lives, other programs that publish into this folder wait: their sets do not mix.
+/// While it lives, other programs that publish into this folder wait, so that their sets do not
+/// mix: some seconds, as somebody else may hold the lock for a reason of his own.
 class FolderLock {
 public:
     explicit FolderLock(const fs::path& folder)
         : opened_(::open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC)) {
         std::error_code failed; // a temporary one is locked by its owner, which is this program
         const fs::path whole = fs::canonical(folder, failed);
-        if (opened_.value() >= 0 && !failed && !is_temporary(whole.filename().string()))
-            ::flock(opened_.value(), LOCK_EX);
+        if (opened_.value() < 0 || failed || is_temporary(whole.filename().string()))
+            return;
+        constexpr int kTries = 60;
+        for (int i = 0; i < kTries && ::flock(opened_.value(), LOCK_EX | LOCK_NB) != 0; ++i)
+            std::this_thread::sleep_for(std::chrono::milliseconds(50));
     }
 
 private:
@@ -170,10 +177,12 @@ void FileSet::list() {
 }
 
 void FileSet::publish(const std::string& last, std::span<const std::string> gone) {
+    std::optional<FolderLock> alone;
+    if (!is_new_)
+        alone.emplace(folder_);
     const Publishing together;
     if (is_new_)
         return place_new(*temporary_, folder_);
-    const FolderLock alone(folder_);
     std::vector<std::string> names = files_in(temporary_->path());
     for (const std::string& name : names) {
         require_replaceable_file(folder_ / name);

@@ -38,7 +38,8 @@ public:
 
     /// Into the folder, all at once where it is new; else one after another, `last` as the last and
     /// its namesake first out of the way. When one of them cannot be replaced, all that went before
-    /// is undone. Another program that publishes into the folder waits for this one.
+    /// is undone. Another program that publishes into the folder waits for this
+    /// one, up to three seconds.
     /// \param gone  names of an earlier set, which are removed.
     void publish(const std::string& last, std::span<const std::string> gone = {});
 

@@ -11,9 +11,14 @@
 namespace taihu {
 namespace {
 
-bool is_near(const Vec3& p) {
-    return std::abs(p.x) <= kMostLength_m && std::abs(p.y) <= kMostLength_m &&
-           std::abs(p.z) <= kMostLength_m;
+constexpr std::array<const char*, 3> kPlaces = {"x_m", "y_m", "z_m"};
+
+/// The first coordinate that is too far off; 3: none is.
+int far_axis(const Vec3& p) {
+    int axis = 0;
+    while (axis < 3 && std::abs(p[axis]) <= kMostHole_m)
+        ++axis;
+    return axis;
 }
 
 } // namespace
@@ -36,13 +41,12 @@ std::vector<Sphere> read_holes(const std::filesystem::path& path) {
         const double radius = table.number(row, size) * (diameter ? 0.5 : 1);
         if (!(radius > 0))
             table.refuse(row, size, "must be > 0, drop the row or fix the number");
-        if (!(radius <= kMostLength_m))
-            table.refuse(row, size, "must be at most 1e6 m, drop the row or check the unit");
+        if (!(radius <= kMostHole_m))
+            table.refuse(row, size, "must be at most 1e9 m, drop the row or check the unit");
         const Vec3 center{table.number(row, x), table.number(row, y), table.number(row, z)};
-        if (!is_near(center))
-            table.refuse(row, x,
-                         "and the places beside it must be within 1e6 m, drop the row or "
-                         "check the unit");
+        if (const int axis = far_axis(center); axis < 3)
+            table.refuse(row, table.column(kPlaces[static_cast<std::size_t>(axis)]),
+                         "must be within 1e9 m, drop the row or check the unit");
         holes.push_back({center, radius});
     }
     return holes;
@@ -62,11 +66,15 @@ std::string format_holes(std::span<const Sphere> holes, std::span<const std::str
     text += "x_m,y_m,z_m,radius_m\n";
     for (std::size_t i = 0; i < holes.size(); ++i) {
         const Sphere& hole = holes[i];
-        if (!(hole.radius_m > 0 && hole.radius_m <= kMostLength_m) || !is_near(hole.center))
-            throw Error(Fault::bad_argument, "holes[" + std::to_string(i) + "]: radius_m is " +
-                                                 shortest(hole.radius_m) +
-                                                 "; centre and radius must be within 1e6 m, "
-                                                 "radius > 0");
+        const auto refuse = [&](const char* what, double value, const char* must) {
+            throw Error(Fault::bad_argument, "holes[" + std::to_string(i) + "]: " + what + " is " +
+                                                 shortest(value) + ", must be " + must +
+                                                 " m; use another scale, or check the unit");
+        };
+        if (!(hole.radius_m > 0 && hole.radius_m <= kMostHole_m))
+            refuse("radius_m", hole.radius_m, "> 0 and at most 1e9");
+        if (const int axis = far_axis(hole.center); axis < 3)
+            refuse(kPlaces[static_cast<std::size_t>(axis)], hole.center[axis], "within 1e9");
         for (const double value : {hole.center.x, hole.center.y, hole.center.z})
             text += shortest(value) + ',';
         text += shortest(hole.radius_m) + '\n';

@@ -1,6 +1,9 @@
 #include "stats/core/file_set.h"
 
+#include <fcntl.h>
 #include <set>
+#include <sys/file.h>
+#include <unistd.h>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -44,6 +47,17 @@ TEST(FileSet, WithoutPublishNothingIsLeft) {
     }
     EXPECT_EQ(names_in(scratch.path()), Names{"there"});
     EXPECT_TRUE(fs::is_empty(scratch / "there"));
+}
+
+TEST(FileSet, AFolderThatSomebodyHoldsIsWaitedForAndThenTaken) {
+    const Scratch scratch;
+    const int held = ::open(scratch.path().c_str(), O_RDONLY | O_CLOEXEC);
+    ASSERT_EQ(::flock(held, LOCK_EX), 0);
+    FileSet set(scratch.path());
+    set.add("list", "now");
+    set.publish("list");
+    ::close(held);
+    EXPECT_EQ(read_file(scratch / "list"), "now");
 }
 
 TEST(FileSet, AFolderKeepsWhatIsNotOfTheSet) {

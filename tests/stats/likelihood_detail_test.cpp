@@ -43,6 +43,20 @@ TEST(UnitSection, AgreesWithTheSectionLaw) {
     }
 }
 
+// Weibull's tail falls out of the range of a double within a step of the table.
+TEST(UnitSection, FarOutNothingIsLeft) {
+    for (const auto& [family, shape] : kCases) {
+        UnitSection table(family, shape);
+        table.cover(-1, 14);
+        bool is_far = false;
+        for (double x = -1; x < 14; x += 0.0137) {
+            EXPECT_FALSE(is_far && table.log_survival(x) > -40) << family_name(family) << " " << x;
+            is_far = is_far || table.log_survival(x) < -50;
+        }
+        EXPECT_TRUE(is_far) << family_name(family);
+    }
+}
+
 TEST(UnitSection, GrowsWithoutForgetting) {
     UnitSection table(Family::gamma, 0.7);
     table.cover(-1, 0);

@@ -117,7 +117,9 @@ TEST(Outputs, WhatIsPrintedAndDoesNotArriveIsSaid) {
         EXPECT_THAT(said.err, HasSubstr("stdout: cannot write")) << command;
     }
     // One who has read enough may close the pipe.
-    EXPECT_EQ(run("taihu rock --list | true", folder.path()).err, "");
+    for (const char* command : {"rock --list", "rock --list --json", "gallery --list --json"})
+        EXPECT_EQ(run(std::string("(sleep 0.3; taihu ") + command + ") | true", folder.path()).err,
+                  "");
 }
 
 TEST(Outputs, NoDeviceIsReplaced) {

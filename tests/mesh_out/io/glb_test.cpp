@@ -348,6 +348,24 @@ TEST(DracoGlb, PartsShareAStreamOrHaveTheirOwn) {
         primitives.push_back(primitives[0]);
     EXPECT_EQ(parse(join(chunks)).levels[0].triangles.size(), 41 * n);
 
+    // Streams of their own, more than one program reads at once.
+    Chunks apart = chunks;
+    const Json first = apart.json["bufferViews"][0];
+    const std::string stream = apart.bin.substr(first.value("byteOffset", std::size_t{0}),
+                                                first["byteLength"].get<std::size_t>());
+    for (std::size_t i = 1; i < 41; ++i) {
+        apart.json["meshes"][0]["primitives"][i]["extensions"]["KHR_draco_mesh_compression"]
+                  ["bufferView"] = apart.json["bufferViews"].size();
+        apart.json["bufferViews"].push_back(
+            {{"buffer", 0}, {"byteOffset", apart.bin.size()}, {"byteLength", stream.size()}});
+        apart.bin += stream;
+        apart.bin.resize((apart.bin.size() + 3) / 4 * 4);
+    }
+    apart.json["buffers"][0]["byteLength"] = apart.bin.size();
+    EXPECT_EQ(parse(join(apart)).levels[0].triangles.size(), 41 * n);
+    apart.bin[apart.bin.size() - stream.size()] = 'X';
+    expect_refused(join(apart), MeshFormat::glb, Fault::bad_input, {"not a Draco stream"});
+
     // A view of its own of the same bytes, and one more than the file can have.
     Json& view = primitives[1]["extensions"]["KHR_draco_mesh_compression"]["bufferView"];
     view = chunks.json["bufferViews"].size();

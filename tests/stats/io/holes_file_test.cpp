@@ -23,7 +23,7 @@ std::vector<Sphere> read_text(const std::string& text) {
 
 TEST(HolesFile, ReadsBackTheSameBits) {
     const HoleStream stream(Law::exponential(3), {{-1, -1, -1}, {1, 1, 1}}, 0.7, 5);
-    std::vector<Sphere> holes = {{{0, -0.0, 1e-300}, 5e-324}, {{1e6, 1.0 / 3, -1e-5}, 0.1}};
+    std::vector<Sphere> holes = {{{0, -0.0, 1e-300}, 5e-324}, {{1e9, 1.0 / 3, -1e-5}, 0.1}};
     for (std::uint64_t i = 0; i < 100; ++i)
         holes.push_back(stream.hole(i));
     EXPECT_EQ(read_text(format_holes(holes)), holes);
@@ -56,9 +56,9 @@ std::string refusal(const std::string& text) {
 
 TEST(HolesFile, NamesTheRowThatIsWrong) {
     EXPECT_THAT(refusal("x_m,y_m,z_m,radius_m\n1,2,3,1e308\n"),
-                HasSubstr("holes.csv:2: column 4 'radius_m' is '1e308'; must be at most 1e6 m"));
+                HasSubstr("holes.csv:2: column 4 'radius_m' is '1e308'; must be at most 1e9 m"));
     EXPECT_THAT(refusal("x_m,y_m,z_m,radius_m\n1,-1e308,3,1\n"),
-                HasSubstr("holes.csv:2: column 1 'x_m' is '1'; and the places beside it"));
+                HasSubstr("holes.csv:2: column 2 'y_m' is '-1e308'; must be within 1e9 m"));
     EXPECT_THAT(refusal("x_m,y_m,z_m,radius_m\n1,2,3,4\n1,2,3,-0.02\n"),
                 HasSubstr("holes.csv:3: column 4 'radius_m' is '-0.02'; must be > 0"));
     EXPECT_THAT(refusal("x_m,y_m,z_m,diameter_m\n1,2,3,0\n"), HasSubstr("'diameter_m' is '0'"));
