@@ -68,6 +68,8 @@ std::pair<TriMesh, PositionGrid> read_low(const BakePair& pair, const Console& c
     TriMesh mesh = file.levels.front();
     if (file.levels.size() > 1)
         console.say("{}: the finest of {} levels taken", where, file.levels.size());
+    if (!(bounds(mesh).longest() > 0))
+        throw Error(Fault::bad_input, where + ": has no extent; export it again");
     const PositionGrid grid = grid_of(mesh).value_or(finest_grid(bounds(mesh)));
     for (Vec3& p : mesh.positions)
         for (int axis = 0; axis < 3; ++axis)
@@ -79,18 +81,30 @@ std::pair<TriMesh, PositionGrid> read_low(const BakePair& pair, const Console& c
     return {std::move(creased.mesh), grid};
 }
 
-/// How far from the low mesh the other is sought: as far as they are measured to lie apart.
-double cage_m(const BakePair& pair, const High& high, const TwoSidedDistance& apart) {
-    const bool given = !pair.cage.empty();
-    const double most = given ? kMostApart : kFarApart;
-    if (apart.max_m > most * high.measure.longest_m)
+/// Two-sided distances of what the boxes hold are this or more.
+double apart_at_least_m(const Box& a, const Box& b) {
+    double most = 0;
+    for (int axis = 0; axis < 3; ++axis)
+        most =
+            std::max({most, std::abs(a.lo[axis] - b.lo[axis]), std::abs(a.hi[axis] - b.hi[axis])});
+    return most;
+}
+
+void refuse_far(const BakePair& pair, const High& high, double apart_m) {
+    const double most = pair.cage.empty() ? kFarApart : kMostApart;
+    if (apart_m > most * high.measure.longest_m)
         throw Error(Fault::bad_argument,
                     fmt::format("{}: lies up to {:.3g} m off {}, which is {:.3g} m long; put both "
                                 "in one place (--unit, --up), or say how far to look (--cage)",
-                                pair.low.string(), apart.max_m, pair.high.path.string(),
+                                pair.low.string(), apart_m, pair.high.path.string(),
                                 high.measure.longest_m));
-    return given ? length_m("--cage", pair.cage, high.measure)
-                 : kCageMargin * apart.max_m + high.measure.voxel_m;
+}
+
+/// How far from the low mesh the other is sought: as far as they are measured to lie apart.
+double cage_m(const BakePair& pair, const High& high, const TwoSidedDistance& apart) {
+    refuse_far(pair, high, apart.max_m);
+    return !pair.cage.empty() ? length_m("--cage", pair.cage, high.measure)
+                              : kCageMargin * apart.max_m + high.measure.voxel_m;
 }
 
 void tell(const std::string& where, const BakedLevel& baked, const Certificate& certificate,
@@ -120,6 +134,7 @@ nlohmann::ordered_json write_baked_pair(const BakePair& pair, const Console& con
     // One in another unit may be a thousand times as large: samples by its size, not by the voxel.
     const double spacing_m = std::max({measure.voxel_m, bounds(low).longest() / kSamplesAlong,
                                        bounds(high.surface).longest() / kSamplesAlong});
+    refuse_far(pair, high, apart_at_least_m(bounds(low), bounds(high.surface))); // at once
     const TwoSidedDistance apart = two_sided_distance(low, high.surface, spacing_m);
     const double reach_m = cage_m(pair, high, apart);
     console.say("{}: {:.3g} m off {} at most, {:.3g} m on average; looking up to {:.3g} m along "

@@ -54,7 +54,13 @@ std::vector<TriMesh> meshes_of(const RenderArgs& args, const Console& console) {
         mesh.normals = surface_normals(*solid, mesh.positions);
         return {std::move(mesh)};
     }
-    return read_mesh(args.file.path, args.file.mesh_settings(), console.progress).levels;
+    std::vector<TriMesh> levels =
+        read_mesh(args.file.path, args.file.mesh_settings(), console.progress).levels;
+    for (const TriMesh& level : levels)
+        if (!(bounds(level).longest() > 0))
+            throw Error(Fault::bad_input,
+                        args.file.path.string() + ": has no extent; export it again");
+    return levels;
 }
 
 ReliefMap map_of(const std::string& name) {

@@ -1,6 +1,7 @@
 // taihu sample: a law as a table of holes.
 #include "stats/core/error.h"
 #include "stats/core/file.h"
+#include "stats/core/of_file.h"
 #include "stats/io/holes_file.h"
 #include "tools/holes_options.h"
 #include "tools/solid_files.h"
@@ -47,7 +48,8 @@ void run(const SampleArgs& args, const Console& console) {
     console.may_write(args.out, {args.law, args.solid.path, args.placement.where});
     const LawHoles holes = sample(args, console);
     check_cancelled(console.progress);
-    write_file(args.out, format_holes(holes.placed.holes, holes.comments));
+    write_file(args.out, of_file(base_name(args.law),
+                                 [&] { return format_holes(holes.placed.holes, holes.comments); }));
     nlohmann::ordered_json json = {{"file", args.out.string()},
                                    {"holes", holes.placed.holes.size()},
                                    {"missed", holes.placed.n_missed}};

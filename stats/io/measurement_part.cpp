@@ -137,6 +137,10 @@ void read_plain(const Table& table, std::string_view name, Part& part) {
 }
 
 void read_bins(const Table& table, Part& part) {
+    constexpr std::size_t kMostBins = 2000; // each asks for an integral of every law that is tried
+    if (table.n_rows() > kMostBins)
+        table.refuse_line(0, std::to_string(table.n_rows()) + " bins, at most " +
+                                 std::to_string(kMostBins) + " are read; join them");
     const auto lo = table.column("diameter_lo"), hi = table.column("diameter_hi"),
                count = table.column("count");
     for (std::size_t row = 0; row < table.n_rows(); ++row) {
