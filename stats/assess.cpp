@@ -34,15 +34,17 @@ void test_fit(const Fit& fit, const Measurements& measurements, const AssessSett
         a.findings.push_back("The fit could not be tested: " + std::string(e.what()) + ".");
         return;
     }
-    const double p = a.goodness->anderson_darling.p_value;
+    // Where a law ends, its end falls beside the greatest profile each time that it is fitted, and
+    // one profile beyond it would be all that Anderson-Darling sees.
+    const bool ends = family == Family::constant || family == Family::uniform;
+    const double p = (ends ? a.goodness->cramer_von_mises : a.goodness->anderson_darling).p_value;
     const std::string name(family_name(family));
+    const std::string by = ends ? " holes (Cramer-von Mises p " : " holes (Anderson-Darling p ";
     if (p > kSignificance)
-        a.findings.push_back("The sizes look like sections of " + name +
-                             " holes (Anderson-Darling p " + rounded(p, 2) +
+        a.findings.push_back("The sizes look like sections of " + name + by + rounded(p, 2) +
                              "); that does not exclude the other laws.");
     else
-        a.findings.push_back("The sizes do not look like sections of " + name +
-                             " holes (Anderson-Darling p " + rounded(p, 2) +
+        a.findings.push_back("The sizes do not look like sections of " + name + by + rounded(p, 2) +
                              "); take the table of the photo in place of the law, or look whether "
                              "two kinds of holes were marked.");
 }

@@ -56,6 +56,20 @@ TEST(Assess, GoodDataRaiseNoAlarm) {
     EXPECT_FALSE(a.curvature);
 }
 
+TEST(Assess, ALawThatEndsIsJudgedByAllOfItsProfiles) {
+    Measurements m = photo();
+    const AssessSettings settings{.n_resamples = 99, .resolution = 0.01};
+    const auto judged = [&] {
+        const Fit fit = fit_law(m.sample, Family::constant, {.resolution = 0.01});
+        return assess(fit, m, settings).findings;
+    };
+    EXPECT_THAT(judged(), Contains(HasSubstr("do not look like sections of constant holes")));
+    const SectionDraws draws(Law::constant(0.3), 0.02);
+    for (std::size_t i = 0; i < m.sample.diameters.size(); ++i)
+        m.sample.diameters[i] = 0.01 * std::round(100 * draws.diameter({4, 1}, i));
+    EXPECT_THAT(judged(), Contains(HasSubstr("sizes look like sections of constant holes")));
+}
+
 TEST(Assess, HolesOnOneSideAreFound) {
     const Assessment a = assessed(photo(1.5));
     EXPECT_LT(a.locations[0].cells->p_value, 0.001);
