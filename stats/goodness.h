@@ -31,8 +31,8 @@ struct GoodnessTest {
     double p_value = 1;  ///< share of samples as far off as this one, itself counted
 };
 
-/// Whether profiles may come from a law; Anderson-Darling is the one to go by, Cramer-von Mises where
-/// a fitted law ends (constant, uniform).
+/// Whether profiles may come from a law; Anderson-Darling is the one to go by, Cramer-von Mises
+/// where a fitted law ends (constant, uniform).
 struct Goodness {
     GoodnessTest anderson_darling, kolmogorov_smirnov, cramer_von_mises, chi_squared;
     std::uint64_t n_profiles = 0;  ///< that were tested

@@ -30,8 +30,8 @@ struct MemoryUse {
 };
 
 /// Memory that this process may still take [bytes]: the least of what the machine has left, of the
-/// limit of its control group, of its own limit of address space, and of `asked`, or without that of
-/// its own limit of data.
+/// limit of its control group, of its own limit of address space, and of `asked`, or without that
+/// of its own limit of data.
 double memory_limit_bytes(std::optional<double> asked = std::nullopt);
 
 /// Whether a solid in this box could need more than the limit at all: no need to estimate if not.
