@@ -208,31 +208,55 @@ void show(const Job& job, std::size_t worker, std::uint64_t item, Fate fate) {
                 printable(said, 600).c_str());
 }
 
-/// Keeps one worker at work to the last of its items.
-void watch(const Job& job, std::size_t worker, std::map<Fate, std::size_t>& shown) {
-    for (std::uint64_t first = worker; first < job.n;) {
-        const pid_t pid = start(job, worker, first);
-        int status = 0;
-        bool killed = false;
-        while (::waitpid(pid, &status, WNOHANG) == 0) {
-            if (now_ms() - job.shared->since_ms[worker] > 12000 * kMostSeconds && !killed)
-                killed = ::kill(pid, SIGKILL) == 0;
-            std::this_thread::sleep_for(std::chrono::milliseconds(5));
-        }
-        std::uint64_t item = job.shared->item[worker];
-        if (item != ~std::uint64_t{0}) { // it died over this one
-            job.shared->fates[item] = killed ? slow : crash;
-        } else { // it ended, or stopped at something to show
-            item = first;
-            while (item < job.n && job.shared->fates[item] < crash)
-                item += kWorkers;
-            if (item >= job.n)
-                return;
-        }
+/// One worker's process, and the item it began with.
+struct Run {
+    std::uint64_t first = 0;
+    pid_t pid = 0; ///< 0: none any more
+    bool killed = false;
+};
+
+/// What a process that has ended leaves: marks and shows the item it stopped at, if any, and starts
+/// the next one behind it.
+void follow(const Job& job, std::size_t worker, Run& run, std::map<Fate, std::size_t>& shown) {
+    std::uint64_t item = job.shared->item[worker];
+    if (item != ~std::uint64_t{0}) { // it died over this one
+        job.shared->fates[item] = run.killed ? slow : crash;
+    } else { // it ended, or stopped at something to show
+        item = run.first;
+        while (item < job.n && job.shared->fates[item] < crash)
+            item += kWorkers;
+    }
+    if (item < job.n) {
         const Fate fate = job.shared->fates[item];
         if (shown[fate]++ < kShown)
             show(job, worker, item, fate);
-        first = item + kWorkers;
+    }
+    run = {item + kWorkers, 0, false};
+    if (run.first < job.n)
+        run.pid = start(job, worker, run.first);
+}
+
+/// Keeps the workers at work to the last of their items. One thread watches them all: a fork beside
+/// another thread may take along a lock that it holds, the allocator's of a sanitizer too.
+void watch(const Job& job) {
+    std::map<Fate, std::size_t> shown;
+    std::array<Run, kWorkers> runs;
+    for (std::size_t w = 0; w < kWorkers && w < job.n; ++w)
+        runs[w] = {w, start(job, w, w), false};
+    for (std::size_t n_running = kWorkers; n_running > 0;) {
+        n_running = 0;
+        for (std::size_t w = 0; w < kWorkers; ++w) {
+            Run& run = runs[w];
+            if (run.pid == 0)
+                continue;
+            int status = 0;
+            if (::waitpid(run.pid, &status, WNOHANG) != 0)
+                follow(job, w, run, shown);
+            else if (now_ms() - job.shared->since_ms[w] > 12000 * kMostSeconds && !run.killed)
+                run.killed = ::kill(run.pid, SIGKILL) == 0;
+            n_running += run.pid != 0;
+        }
+        std::this_thread::sleep_for(std::chrono::milliseconds(5));
     }
 }
 
@@ -264,17 +288,12 @@ Counts run(const FuzzFormat& format, std::uint64_t seed, std::uint64_t n) {
             bases.push_back(read_file(folder / std::to_string(bases.size())));
         return bases;
     }();
-    std::array<std::map<Fate, std::size_t>, kWorkers> shown;
-    std::array<std::thread, kWorkers> watchers;
-    for (std::size_t w = 0; w < kWorkers; ++w)
-        job.said[w] = ::memfd_create("said", 0);
-    for (std::size_t w = 0; w < kWorkers; ++w)
-        watchers[w] = std::thread([&, w] { watch(job, w, shown[w]); });
+    for (int& said : job.said)
+        said = ::memfd_create("said", 0);
+    watch(job);
+    for (const int said : job.said)
+        ::close(said);
     Counts counts{};
-    for (std::size_t w = 0; w < kWorkers; ++w) {
-        watchers[w].join();
-        ::close(job.said[w]);
-    }
     for (std::uint64_t i = 0; i < n; ++i)
         ++counts[job.shared->fates[i]];
     ::munmap(memory, size);
